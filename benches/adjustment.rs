@@ -1,6 +1,6 @@
-//! What do the rounds of least squares cost once a posture is known? Asked from the true base and
-//! posture: `rounds`, the coarse and fine rounds on some thousand points of each link, and `whole`,
-//! those and the adjustment of everything on all points, with all that is reported of it.
+//! What is the cost of least squares once a posture is known? Both cases start from the true base
+//! and posture. `rounds` is the coarse and fine rounds on some thousand points of each link;
+//! `whole` adds the adjustment on all points with all that is reported of it.
 //!
 //! The sums of the normal equations are private to `fit`, so this measures the smallest public
 //! calls that are dominated by matching points and summing: `fit::converge` and `fit::again`.

@@ -1,10 +1,10 @@
-//! What does the beam search over the joints of one robot cost? Asked from the true base, with all
-//! hypotheses of the default settings.
+//! What is the cost of the beam search over the joints of one robot? It starts from the true base,
+//! with all hypotheses of the default settings.
 //!
-//! The sweep itself is private to `fit`, so this measures the smallest public call that is
-//! dominated by it: `fit::fit` without the quick look before it (the base is stated to be clear),
-//! with one hypothesis refined and polished, and a least score that nothing reaches, so that no
-//! posture is adjusted or reported.
+//! The sweep is private to `fit`, so that this measures the smallest public call that is dominated
+//! by it: `fit::fit` without the quick test before it (the base is stated to be clear), with one
+//! hypothesis refined and polished, and with a least score that nothing reaches, so that no posture
+//! is adjusted or reported.
 //!
 //! Input: a robot with seven joints at 5 m from six scanners of a million beams each. One thread.
 

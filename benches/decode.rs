@@ -1,6 +1,6 @@
-//! How many points a second are decoded from E57, LAS and LAZ on one thread? `strips` reads each
-//! file as a run reads it, with checksums where the format has them, first coordinates only, then
-//! everything that the file says of a point.
+//! How many points per second are decoded from E57, LAS and LAZ on one thread? `strips` reads each
+//! file as a run does, with checksums where the format has them: first the coordinates only, then
+//! all attributes of each point.
 //!
 //! Input: the same 336,000 points, one scan of a million beams, in all three formats: E57 with
 //! 32-bit floats, LAS and LAZ of point format 6. The files were just written, so they are read
@@ -22,7 +22,7 @@ fn main() {
 fn decode(bencher: Bencher<'_, '_>, want: Want, write: impl Fn(&Cell) -> PathBuf) {
     let cell = Cell::new(N_BEAMS);
     let paths = [write(&cell)];
-    // Opening reads a sample of the points for the raster, which is not asked here.
+    // Opening reads a sample of the points for the raster, which is not measured here.
     let sources = ingest::open(&paths, None, &Settings::default(), &OneByOne).expect("opens");
     let read = || {
         let strips = sources.strips(sources.inputs[0].id, want).expect("opens");
@@ -31,7 +31,7 @@ fn decode(bencher: Bencher<'_, '_>, want: Want, write: impl Fn(&Cell) -> PathBuf
     bencher.counter(ItemsCount::new(read())).bench_local(|| black_box(read()));
 }
 
-/// What is wanted of each point, in words.
+/// The attributes that are read, in words.
 const WANTED: [&str; 2] = ["coordinates", "everything"];
 
 fn want(name: &str) -> Want {

@@ -1,8 +1,8 @@
-//! What does one look-up in a depth image cost? Asked of all surface samples of the robot, sixteen
-//! at a time, as the search asks, and one at a time, of the image of one scanner.
+//! What is the cost of one look-up in a depth image? All surface samples of the robot are looked up
+//! in the image of one scanner, sixteen at a time, as the search does, and one at a time.
 //!
 //! Input: a robot at 5 m in a scan of a million beams; some 350,000 samples. One thread.
-//! The figures of one machine differ by a few percent from run to run.
+//! Times on one machine differ by a few percent between runs.
 
 mod common;
 
@@ -15,7 +15,8 @@ fn main() {
     divan::main();
 }
 
-/// Width of a cell that is asked for, metres: the spacing of samples in the search.
+/// Width around a place within which beams are looked up, metres: the spacing of samples in the
+/// search.
 const FOOTPRINT: f32 = 0.02;
 
 /// Surface samples of all links in the frame of the base, metres.

@@ -1,9 +1,9 @@
-//! How many beams a second does the virtual scanner cast on one thread? Asked of the source's scene
-//! (one robot on a bare floor) and of the demo's (three robots in a furnished hall), whose beams
-//! have a width and are cast as several rays each.
+//! How many beams per second does the virtual scanner cast on one thread? The scenes are that of
+//! the source (one robot on a bare floor) and that of the demo (three robots in a furnished hall),
+//! whose beams have a width and are cast as several rays each.
 //!
-//! Casting is private to `simulate`, so this measures `Simulator::columns`, which casts whole
-//! columns, mixes what the parts of a beam met, and adds noise.
+//! Casting is private to `simulate`, so that this measures `Simulator::columns`, which casts whole
+//! columns, combines the rays of a beam, and adds noise.
 
 mod common;
 
@@ -18,7 +18,7 @@ fn main() {
     divan::main();
 }
 
-/// Columns that are cast at once, from the middle of the scan on.
+/// Number of columns that are cast at once, from the middle of the scan on.
 const N_COLUMNS: u32 = 64;
 
 fn cast(bencher: Bencher<'_, '_>, simulator: &Simulator) {

@@ -1,5 +1,5 @@
-//! How many labelled points a second become records of the tiles that a run writes? `records` packs
-//! them into bytes, tile by tile; `las` and `laz` write them to files as well, the second one
+//! How many labelled points per second are encoded as records of the tiles that a run writes?
+//! `records` packs them into bytes, tile by tile; `las` and `laz` also write them to files, `laz`
 //! compressed.
 //!
 //! Input: one scan of a million beams in tiles of 5 m, records of LAS point format 6 with robot and
@@ -17,7 +17,7 @@ fn main() {
     divan::main();
 }
 
-/// Points that are packed together: a strip's.
+/// Number of points that are packed together: those of a strip.
 const STRIP: usize = 65_536;
 
 /// The points of one scan, cut into strips.

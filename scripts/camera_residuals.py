@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Real depth-camera clouds and the true posture of the robot in them; how far the clouds themselves are off it, out.
+"""Measures the distances of real depth-camera clouds from the robot in its true posture: the errors of the clouds themselves.
 
     scripts/camera_residuals.py --clouds ../shared/scans [--only zed2i]
 

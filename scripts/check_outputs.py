@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Opens everything under an output folder with the libraries that others use (numpy, laspy; pye57 and PDAL where
-installed) and checks that points, classes and extra fields are what result.json says."""
+installed) and checks that points, classes and extra fields agree with result.json."""
 
 import argparse
 import json

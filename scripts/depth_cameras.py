@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Real depth-camera clouds with known joints, each frame a run of its own; table of errors out (needs numpy).
+"""Runs the program on each frame of real depth-camera clouds with known joints, and prints a table of errors (needs numpy).
 
     scripts/depth_cameras.py --clouds ../shared/scans --out DIR [--only realsense] [--program stillpoint]
 

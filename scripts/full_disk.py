@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""A disk that fills up under a run, at random moments: what the run says, whether what was there stays whole, and whether the
-next run, with room again, ends with the bytes of an undisturbed one. Needs Linux, and the right to mount.
+"""Fills the disk at random moments during a run. Checks the message of the run, that an earlier result stays complete, and that
+the next run, with free space again, writes the same bytes as an undisturbed one. Needs Linux, and the right to mount.
 
     stillpoint bench throughput --points 5M --robots ROBOTS --keep --out hall
     scripts/full_disk.py --inputs hall/5000000/scans.las --scanners hall/5000000/scanners.toml --robots ROBOTS

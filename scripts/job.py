@@ -1,4 +1,4 @@
-"""The job that a script runs again and again: its flags, its command line, and what its result is known by."""
+"""The job that a script runs repeatedly: its flags, its command line, and the digests of its result."""
 
 import argparse
 import hashlib

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Runs that are killed at random moments, again and again, until one ends: how much work that takes beside one run that
-nobody disturbs, and whether the outputs are the same bytes.
+"""Kills runs at random moments until one ends. Measures the work of all of them relative to one undisturbed run, and compares
+the outputs byte for byte.
 
     stillpoint bench throughput --points 20M --robots ROBOTS --keep --out hall
     scripts/kills.py --inputs hall/20000000/scans/scans.las --scanners hall/20000000/scans/scanners.toml --robots ROBOTS --kills 200

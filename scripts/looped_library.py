@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A robot library with loops described in `loops.md` in; a copy of it with a `robot.toml` beside each of these models out.
+"""Copies a robot library whose loops are described in `loops.md`, and writes a `robot.toml` for each of these models.
 
     scripts/looped_library.py --robots ../shared/robots --out DIR
 

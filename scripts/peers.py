@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The same work with other tools: reads a LAS file, takes the floor off, finds connected bodies, writes 5 m tiles with
-their numbers. One line of JSON a tool and file; what is there already is not run again.
+"""Does the same work with other tools: reads a LAS file, removes the floor, finds connected bodies, and writes 5 m tiles with
+their numbers. Prints one line of JSON for each tool and file; results that exist already are not computed again.
 
     stillpoint bench throughput --points 10M,50M --truth --keep --out bench
     scripts/peers.py bench/10000000 bench/50000000 --robots bench/robots --out peers

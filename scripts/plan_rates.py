@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Rows of `bench plan` in; the rates that `plan` predicts with, measured anew, and how far they predict these and other rows, out.
+"""Fits the rates that `plan` predicts with to rows of `bench plan`, and prints how well they predict these and other rows.
 
     stillpoint bench plan --halls 12 --seed 1 --robots LIBRARY --out DEVELOPED --threads 1
     stillpoint bench plan --halls 10 --seed 2 --robots LIBRARY --out FRESH

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A plant of which one cell is scanned again, alone and with more and more plant beside it; table of times out.
+"""Times the rescan of one cell, alone and beside increasingly large parts of a plant, and prints a table.
 
     stillpoint bench rescan --cases 1 --seed 7 --keep --out CASE        # leaves CASE/700000/then and now
     stillpoint bench throughput --points 100M --out HALL                # leaves scans.las and scanners.toml

@@ -1,5 +1,5 @@
-//! What the benches measure on: a demo robot on a bare floor, seen by six virtual scanners 5 m
-//! away, as a model, as files and as views. The same seed draws the same scene each time.
+//! The input of the benches: a demo robot on a bare floor, seen by six virtual scanners 5 m away,
+//! as a model, as files and as views. The same seed gives the same scene each time.
 
 #![allow(dead_code, reason = "each bench takes what it needs")]
 
@@ -13,12 +13,12 @@ use simulate::demo_robots::{self, WELDER};
 use simulate::{SimScan, Simulator};
 use std::path::{Path, PathBuf};
 
-/// Beams of each scanner over the whole sphere.
+/// Number of beams of each scanner over the whole sphere.
 pub(crate) const N_BEAMS: u64 = 1_000_000;
 /// Seed of the scene's noise.
 const SEED: u64 = 60;
 
-/// The welder with its base at the origin, its posture, and what the scanners saw of it.
+/// The welder with its base at the origin, its posture, and the scans of it.
 pub(crate) struct Cell {
     /// The welder alone.
     pub(crate) models: Vec<Model>,
@@ -97,7 +97,7 @@ impl Cell {
         self.folder.path()
     }
 
-    /// What may belong to the robot: its reach about the base, and a hand's width below the floor.
+    /// Bounds of what may belong to the robot: its reach about the base, and 0.1 m below the floor.
     pub(crate) fn region(&self) -> Region {
         let reach = self.models[0].reach();
         let bounds = Aabb { min: [-reach, -reach, -0.1], max: [reach, reach, 2.0 * reach] };
@@ -125,7 +125,7 @@ impl Cell {
         }
     }
 
-    /// What each scan saw of the region, by way of an E57 file as a run would read it.
+    /// The view of each scan of the region, from an E57 file that is read as in a run.
     pub(crate) fn views(&self, scans: &[SimScan]) -> Vec<View> {
         let (path, _) = self.write_e57(scans);
         let sources = ingest::open(&[path], None, &ingest::Settings::default(), &OneByOne)
@@ -166,11 +166,11 @@ fn view(scan: &contract::Scan, xyz: &[[f32; 3]], region: &Region) -> View {
     builder.finish()
 }
 
-/// Points of all scans in the world, with what the scanner says of each.
+/// The points of all scans in the world, with what the scanner knows about each.
 pub(crate) struct World {
     /// Metres.
     pub(crate) xyz: Vec<[f64; 3]>,
-    /// What each point belongs to.
+    /// The object that each point belongs to.
     pub(crate) labels: Vec<contract::Label>,
     /// 0..65535.
     pub(crate) intensity: Vec<u16>,
@@ -191,7 +191,7 @@ impl World {
         all
     }
 
-    /// As columns for the writers.
+    /// The points as columns for the writers.
     pub(crate) fn columns(&self) -> PointColumns<'_> {
         PointColumns {
             world: &self.xyz,

@@ -152,7 +152,7 @@ impl Stamp {
             return Ok(());
         }
         let error = Error::bad_input("the file was changed while it was read");
-        Err(error.at(path.display()).hint("start again once it is whole"))
+        Err(error.at(path.display()).hint("start again when it is complete"))
     }
 
     /// Whether its last change is so long ago that a later one would show.

@@ -90,7 +90,7 @@ pub(crate) fn at_robot<T>(
     let others: Vec<(usize, &Fit)> =
         fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
     let (mut body, mut obstacles) = surrounded(robot, &around, &others, &models, request, engine)?;
-    body.stand(&robot.found(), &mut obstacles);
+    body.remove_robot(&robot.found(), &mut obstacles);
     then(&RobotSite {
         request,
         robot,
@@ -174,7 +174,7 @@ fn contacts(walk: &PathWalk<'_>, engine: &Engine) -> Result<Contacts> {
     let mut all = Contacts::default();
     for from in (0..walk.n_pieces()).step_by(WAITING) {
         let some = (from..(from + WAITING).min(walk.n_pieces())).collect();
-        let looked = engine.fan_out(Task::new("check"), some, |piece| Ok(walk.look(piece)))?;
+        let looked = engine.fan_out(Task::new("check"), some, |piece| Ok(walk.examine(piece)))?;
         looked.into_iter().for_each(|one| walk.add(one, &mut all));
     }
     Ok(all)

@@ -4,7 +4,7 @@
 use super::report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
 use super::trajectory::Trajectory;
 use crate::cache::Manifest;
-use clearance::{Contact, ContactLevel, Contacts, Leg, What};
+use clearance::{Contact, ContactLevel, Contacts, Leg, ObstacleKind};
 use contract::{Error, Fit, JointFit, Result, Verdict};
 use export::{RobotEntry, mesh_files};
 use robot::{JointKind, Model};
@@ -46,8 +46,8 @@ impl CheckedRobot<'_> {
         let folder = format!("robots/{id}/meshes/");
         let of_links = |path: &str| path.starts_with(&folder) && !path.contains("_hanging_");
         let n = manifest.files.iter().filter(|f| of_links(&f.path)).count();
-        let hanging = own.iter().filter(|(path, _)| path.contains("_hanging_")).count();
-        if n + hanging != own.len() || !own.iter().all(|file| is_there(file)) {
+        let attached_points = own.iter().filter(|(path, _)| path.contains("_hanging_")).count();
+        if n + attached_points != own.len() || !own.iter().all(|file| is_there(file)) {
             return bad("other meshes");
         }
         Ok(())
@@ -157,7 +157,7 @@ impl CheckedRobot<'_> {
     ) -> PathReport {
         let warnings = self.uncertain(path, request.margin);
         let mut doubts = if warnings.is_empty() { Vec::new() } else { vec![PathDoubt::Posture] };
-        let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
+        let is_beside = |c: &Contact| c.what == ObstacleKind::Beside || c.is_doubtful;
         let stands = |c: &&Contact| !c.as_found && !is_beside(c);
         let is = |level: ContactLevel| contacts.iter().filter(stands).any(|c| c.level >= level);
         let has = |is: &dyn Fn(&Contact) -> bool| contacts.iter().any(is);

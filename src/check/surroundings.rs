@@ -5,7 +5,10 @@ use crate::cache::{VerifiedFiles, tiles_of};
 use crate::engine::{Engine, Task};
 use crate::label::known_space::poses;
 use crate::result::plant_state::PlantState;
-use clearance::{CELL, Cells, Hung, KnownBounds, Obstacles, ScannerAt, Shadow, What, hanging};
+use clearance::{
+    AttachedPoints, CELL, Cells, KnownBounds, ObstacleKind, Obstacles, ScannerAt, Shadow,
+    attached_points,
+};
 use contract::{Error, Fit, PointKind, Result, Scan, Space};
 use export::{OldPoint, ResultFile, SpaceEntry, read_tile};
 use geometry::{Aabb, Point, Pose};
@@ -61,7 +64,7 @@ impl Surroundings<'_> {
         models: &[Model],
         far: f64,
         engine: &Engine,
-    ) -> Result<(Hung, Obstacles)> {
+    ) -> Result<(AttachedPoints, Obstacles)> {
         let moves = robot.model.moving();
         let base_from_world = &robot.fit.world_from_base.inverse();
         let standing = |(number, fit): &(usize, &Fit)| {
@@ -91,7 +94,7 @@ impl Surroundings<'_> {
     }
 
     /// Cells of all points that may stand in the way, and points that hang on the robot.
-    fn points(&self, sorting: &Sorting<'_>, engine: &Engine) -> Result<(Cells, Hung)> {
+    fn points(&self, sorting: &Sorting<'_>, engine: &Engine) -> Result<(Cells, AttachedPoints)> {
         let Some(edge) = self.state.records.tile_edge() else {
             return Err(Error::bad_input("the result has no tiles to read its points from")
                 .at(self.out.join("tiles").display())
@@ -121,11 +124,11 @@ impl Surroundings<'_> {
                 cells.into_iter().for_each(|(cell, is_grazed)| meet(own, cell, is_grazed));
             }
         }
-        all.cells.settle();
+        all.cells.remove_duplicates();
         let middle = |cell: [i32; 3]| cell.map(|v| ((f64::from(v) + 0.5) * CELL) as f32);
         let hung = all.hung.into_iter().map(|(link, cells)| {
             let all: Vec<_> = cells.into_iter().map(|(cell, told)| (middle(cell), told)).collect();
-            (link, hanging(&all))
+            (link, attached_points(&all))
         });
         Ok((all.cells, hung.collect()))
     }
@@ -194,7 +197,7 @@ impl Surroundings<'_> {
         if !is_inside && !is_hung {
             return Ok(());
         }
-        into.cells.see(&p, point.source_id);
+        into.cells.add_measurement(&p, point.source_id);
         let shadows = sorting.shadows.get(&point.source_id);
         let is_grazed = shadows.is_some_and(|all| all.iter().all(|shadow| shadow.is_grazed(&p)));
         let what = match label.kind {
@@ -209,16 +212,16 @@ impl Surroundings<'_> {
                         return Ok(());
                     }
                     // What hangs on its foot stays where it is.
-                    None if is_inside => What::Uncertain,
+                    None if is_inside => ObstacleKind::Uncertain,
                     None => return Ok(()),
                 }
             }
             PointKind::Link | PointKind::Attachment if label.robot >= 0 => {
                 self.named(label.robot, point)?
             }
-            PointKind::Fixed => What::Fixed,
-            PointKind::Floor => What::Floor,
-            _ => What::Uncertain,
+            PointKind::Fixed => ObstacleKind::Fixed,
+            PointKind::Floor => ObstacleKind::Floor,
+            _ => ObstacleKind::Uncertain,
         };
         into.cells.add(p.coords.into(), what, is_grazed, point.source_id);
         into.n_waiting += 1;
@@ -226,16 +229,16 @@ impl Surroundings<'_> {
     }
 
     /// Another robot of the result.
-    fn named(&self, number: i16, point: &OldPoint) -> Result<What> {
+    fn named(&self, number: i16, point: &OldPoint) -> Result<ObstacleKind> {
         if (number as usize) < self.result.robots.len() {
-            return Ok(What::Robot(number));
+            return Ok(ObstacleKind::Robot(number));
         }
         let [x, y, z] = point.world;
         Err(Error::bad_input(format!(
             "a point at ({x:.3}, {y:.3}, {z:.3}) is of robot {number}, which the result has not"
         ))
         .at(self.out.join("tiles").display())
-        .hint("`stillpoint verify` says whether the result is whole"))
+        .hint("`stillpoint verify` checks whether the result is complete"))
     }
 }
 
@@ -273,7 +276,7 @@ impl Sorted {
 
     fn settle(&mut self, most: usize) {
         if self.n_waiting > most {
-            self.cells.settle();
+            self.cells.remove_duplicates();
             self.n_waiting = 0;
         }
     }

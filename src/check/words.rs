@@ -1,7 +1,7 @@
 //! What a path came to in; that for people and for programs out.
 
 use super::report::{PathDoubt, PathOutcome, PathReport};
-use clearance::{Contact, ContactLevel, STEP, What};
+use clearance::{Contact, ContactLevel, ObstacleKind, STEP};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -56,14 +56,14 @@ fn level(contact: &Contact) -> &'static str {
 }
 
 impl PathReport {
-    fn what(&self, what: What) -> String {
+    fn what(&self, what: ObstacleKind) -> String {
         match what {
-            What::Fixed => "fixed".into(),
-            What::Floor => "floor".into(),
-            What::Uncertain => "uncertain".into(),
-            What::Beside => "uncertain beside it".into(),
-            What::Unseen => "unseen space".into(),
-            What::Robot(number) => {
+            ObstacleKind::Fixed => "fixed".into(),
+            ObstacleKind::Floor => "floor".into(),
+            ObstacleKind::Uncertain => "uncertain".into(),
+            ObstacleKind::Beside => "uncertain beside it".into(),
+            ObstacleKind::Unseen => "unseen space".into(),
+            ObstacleKind::Robot(number) => {
                 let id = usize::try_from(number).ok().and_then(|at| self.ids.get(at));
                 id.cloned().unwrap_or_default()
             }
@@ -72,7 +72,7 @@ impl PathReport {
 
     fn part(&self, contact: &Contact) -> String {
         let link = self.links.get(contact.link).map_or("", |l| l);
-        match (contact.is_doubtful, contact.hangs) {
+        match (contact.is_doubtful, contact.is_attached) {
             (true, _) => format!("what may hang on {link}"),
             (false, true) => format!("what hangs on {link}"),
             (false, false) => link.to_owned(),
@@ -101,7 +101,7 @@ impl PathReport {
             });
             (self.part(c), self.what(c.what), format!("{place} at waypoint {:.2}", c.worst))
         };
-        let is_beside = |c: &Contact| c.what == What::Beside || c.is_doubtful;
+        let is_beside = |c: &Contact| c.what == ObstacleKind::Beside || c.is_doubtful;
         let anew = |c: &Contact| !c.as_found && !is_beside(c);
         if let Some(c) = worst(&|c| anew(c) && c.level >= ContactLevel::Hit) {
             let (part, what, place) = told(c);
@@ -196,7 +196,7 @@ impl PathReport {
             json!({
                 "level": level(c),
                 "link": self.links.get(c.link),
-                "hangs": c.hangs,
+                "hangs": c.is_attached,
                 "doubtful": c.is_doubtful,
                 "what": self.what(c.what),
                 "as_found": c.as_found,
@@ -204,7 +204,7 @@ impl PathReport {
                 "to": c.to,
                 "worst": c.worst,
                 "time": self.time(c.worst),
-                "gap": (c.what != What::Unseen).then_some(c.gap),
+                "gap": (c.what != ObstacleKind::Unseen).then_some(c.gap),
                 "at": c.at.map(|at| self.world(&at)),
                 "n_postures": c.n_postures,
                 "n_cells": c.n,

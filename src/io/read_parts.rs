@@ -119,9 +119,10 @@ impl<'a> Map for Load<'a> {
         let read = file.read(start, (end - start) as usize);
         let bytes = read.map_err(|e| Error::from(e).at(self.input.path.display()))?;
         if (bytes.len() as u64) < end - start {
-            let error = Error::bad_input("the file was cut short or went away while it was read");
+            let error =
+                Error::bad_input("the file was cut short or became unreadable while it was read");
             let error = error.at(self.input.path.display());
-            return Err(error.hint("start again once it is whole"));
+            return Err(error.hint("start again when it is complete"));
         }
         let parts = own.zip(self.n_bytes).map_or_else(Vec::new, |(own, n_bytes)| {
             let (from, to) = (own.start - start, own.end.max(own.start) - start);

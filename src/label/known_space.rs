@@ -7,7 +7,7 @@ use crate::detect::search::Search;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind, Verdict};
-use freespace::Passed;
+use freespace::PassedVoxels;
 use geometry::{Aabb, Point, Pose, Vector};
 use lattice::ViewSettings;
 use robot::Model;
@@ -64,8 +64,8 @@ impl KnownSpaces<'_, '_> {
         let mut space = Space::unknown(grid);
         let fit = &self.robots.fits[robot];
         let model = &self.robots.models[fit.model];
-        let passed = Passed::new(&region, &views, grid.edge).about(model, &poses(fit, model));
-        freespace::see(&mut space, &passed, &AllThreads);
+        let passed = PassedVoxels::new(&region, &views, grid.edge).about(model, &poses(fit, model));
+        freespace::mark_free(&mut space, &passed, &AllThreads);
         Ok(Some(space))
     }
 
@@ -79,10 +79,10 @@ impl KnownSpaces<'_, '_> {
         };
         for (_, fit) in fits.iter().enumerate().filter(|(i, fit)| is_other(*i, fit)) {
             let model = &models[fit.model];
-            freespace::stand(space, SpaceKind::Other, model, &poses(fit, model));
+            freespace::mark_body(space, SpaceKind::Other, model, &poses(fit, model));
         }
         let own = &models[fits[robot].model];
-        freespace::stand(space, SpaceKind::Robot, own, &poses(&fits[robot], own));
+        freespace::mark_body(space, SpaceKind::Robot, own, &poses(&fits[robot], own));
     }
 }
 

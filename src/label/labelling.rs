@@ -16,7 +16,7 @@ use crate::engine::{AllThreads, Engine, PipeSender, PipedItems, Task};
 use crate::io::read_parts::InputReader;
 use crate::job::Settings;
 use crate::store::Store;
-use attach::Hanging;
+use attach::AttachedPieces;
 use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
 use export::{
     Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
@@ -298,7 +298,7 @@ impl<'a> Labelling<'a> {
     fn write_robot(
         &self,
         i: usize,
-        hanging: &Hanging,
+        hanging: &AttachedPieces,
         space: Option<&Space>,
         picture: &RobotPicture,
         out: &Path,

@@ -4,7 +4,7 @@
 use crate::detect::robots::FittedRobots;
 use crate::engine::{AllThreads, Amount, Engine, Task};
 use crate::store::Store;
-use attach::{Attach, Hanging};
+use attach::{Attach, AttachedPieces};
 use contract::{Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
 use segment::Segment;
 use std::ops::Range;
@@ -23,7 +23,7 @@ pub(crate) struct NearRobots {
     /// Their labels: for each mask, by place.
     pub(crate) labels: Vec<Vec<PlaceRun<Label>>>,
     /// What hangs on each robot.
-    pub(crate) hanging: Vec<Hanging>,
+    pub(crate) hanging: Vec<AttachedPieces>,
 }
 
 impl NearRobots {
@@ -63,7 +63,7 @@ impl NearRobots {
         for own in &mut labels {
             PlaceRun::join(own);
         }
-        Ok(Self { labels, hanging: attach::hang(&attached, fits, models) })
+        Ok(Self { labels, hanging: attach::attached_pieces(&attached, fits, models) })
     }
 
     /// The labels of one mask, for places of which many are neighbours.

@@ -332,9 +332,9 @@ pub(crate) fn seen(
     world: [f64; 3],
 ) -> SessionEvidence {
     match sight {
-        Visibility::Through => SessionEvidence::Nothing { is_pierced: own.is_pierced(world) },
-        Visibility::Onto | Visibility::Close => SessionEvidence::Something,
-        Visibility::Hidden | Visibility::Unseen => SessionEvidence::Not,
+        Visibility::Through => SessionEvidence::Empty { is_pierced: own.is_pierced(world) },
+        Visibility::Onto | Visibility::Close => SessionEvidence::Occupied,
+        Visibility::Hidden | Visibility::Unseen => SessionEvidence::Unobserved,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::engine::{Engine, Task};
 use crate::label::known_space::{KnownSpaces, VoxelMark, bounds, mark, poses};
 use contract::{Result, Space, SpaceGrid, SpaceKind};
 use export::{SpaceEntry, write_space};
-use freespace::Passed;
+use freespace::PassedVoxels;
 use geometry::Aabb;
 use std::path::Path;
 
@@ -66,7 +66,7 @@ impl Found<'_, '_> {
         let mut space = Space::unknown(grid);
         around.stand(&mut space, i);
         let model = &self.models[fit.model];
-        let passed = Passed::new(&self.session.cell, &self.session.new_views, grid.edge)
+        let passed = PassedVoxels::new(&self.session.cell, &self.session.new_views, grid.edge)
             .about(model, &poses(fit, model));
         renew(&mut space, &old, places, |middle| passed.is_free(middle));
         Ok(Some(space))

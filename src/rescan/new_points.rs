@@ -94,7 +94,7 @@ impl Map for NewPoints<'_> {
                 PointKind::Fixed => {
                     let cell = SessionOccupancy::cell(world);
                     if last != Some(cell) {
-                        (last, stood) = (Some(cell), self.then.has_some(&cell));
+                        (last, stood) = (Some(cell), self.then.has_points_near(&cell));
                     }
                     let sight = if stood { Visibility::Onto } else { self.watch.look(world) };
                     out.add(world, area(scan, world), seen(sight, self.own, world));

@@ -9,7 +9,7 @@ use crate::label::labelling::WrittenLabels;
 use crate::result::changed_things::{ThingEntry, word};
 use crate::result::changes::{Change, RobotChange, changes, of_missed, words};
 use crate::result::report::{dropped, input_entry, robot_entry};
-use change::Unseen;
+use change::UnobservedRegion;
 use contract::words::{count, fixed, triple};
 use contract::{Error, Kind, Result, quote};
 use export::{
@@ -225,8 +225,8 @@ impl RescanReport<'_, '_> {
     fn draw(&self, changes: &[RobotChange]) -> export::Canvas {
         let things = self.found.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
             name: format!("T{} {}", k + 1, word(thing.change)),
-            gone: change::SessionOccupancy::middles(&thing.gone),
-            filled: change::SessionOccupancy::middles(&thing.filled),
+            gone: change::SessionOccupancy::centres(&thing.gone),
+            filled: change::SessionOccupancy::centres(&thing.filled),
             at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
         });
         let robots = self.found.robots.compared().into_iter().map(|i| {
@@ -241,7 +241,7 @@ impl RescanReport<'_, '_> {
         let unseen: Vec<_> = unseen.copied().collect();
         draw_changes(
             &self.found.session.past.cell,
-            [&self.found.labels.now.solid(), &change::SessionOccupancy::middles(&unseen)],
+            [&self.found.labels.now.solid(), &change::SessionOccupancy::centres(&unseen)],
             &things.collect::<Vec<_>>(),
             &robots.collect::<Vec<_>>(),
         )
@@ -309,7 +309,7 @@ fn frame_in_words(frame: &CarriedEntry) -> String {
     )
 }
 
-fn region(region: &Unseen) -> serde_json::Value {
+fn region(region: &UnobservedRegion) -> serde_json::Value {
     let bounds = [region.bounds.min, region.bounds.max];
     json!({ "bounds": bounds, "volume_m3": region.volume, "n_points": region.n_points })
 }

@@ -15,7 +15,7 @@ use crate::label::known_space::{reach, region, standing};
 use crate::label::labelling::{Labelling, ScansToLabel};
 use crate::label::near_robots::NearRobots;
 use crate::store::Store;
-use change::{SessionOccupancy, Thing, Unseen, things};
+use change::{SessionOccupancy, Thing, UnobservedRegion, things};
 use contract::{
     Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
 };
@@ -115,7 +115,7 @@ pub(crate) struct CellLabels {
     pub(crate) compared: Compared,
     pub(crate) things: Vec<Thing>,
     /// What stood in the cell and was not looked at.
-    pub(crate) unseen: Vec<Unseen>,
+    pub(crate) unseen: Vec<UnobservedRegion>,
     /// What stands in the cell now.
     pub(crate) now: SessionOccupancy,
 }
@@ -358,7 +358,7 @@ impl<'a> CellComparison<'a> {
         let (things, unseen) = engine.pool()?.install(|| {
             rayon::join(
                 || things(then, &now, settings, &AllThreads),
-                || change::unseen(then, &now, settings),
+                || change::unobserved_regions(then, &now, settings),
             )
         });
         Ok(CellLabels { near, compared, things, unseen, now })

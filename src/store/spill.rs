@@ -26,7 +26,7 @@ pub(super) struct Spill {
 impl Spill {
     pub(super) fn create(dir: &Path) -> Result<Self> {
         let file = tempfile::tempfile_in(dir)
-            .map_err(|e| Error::of_file("a spill file cannot be made", dir, e))?;
+            .map_err(|e| Error::of_file("a spill file cannot be created", dir, e))?;
         Ok(Self { dir: dir.to_owned(), file, len: 0 })
     }
 

@@ -168,7 +168,7 @@ impl Search<'_, '_> {
         let trusted = || fits.iter().filter(|f| f.verdict == Verdict::Trusted);
         let taken: Vec<Aabb> =
             trusted().flat_map(|f| boxes(f, &self.library.models[f.model])).collect();
-        let is_much = sight.pass_over(&taken, MIN_STANDING) >= MIN_LEFT;
+        let is_much = sight.exclude_boxes(&taken, MIN_STANDING) >= MIN_LEFT;
         is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
     }
 
@@ -184,7 +184,8 @@ impl Search<'_, '_> {
         if gone.len() < MIN_GONE {
             return Vec::new();
         }
-        let feet = self.candidates(&sight.apart(), sights.floors, 0.0, breadth(sights.floors));
+        let feet =
+            self.candidates(&sight.scan_by_scan(), sights.floors, 0.0, breadth(sights.floors));
         let mut out: Vec<Fit> = Vec::new();
         let in_reach = |candidate: &&Candidate| {
             let here = base(&candidate.bases[0].0) - sights.region.origin.coords;

@@ -212,8 +212,8 @@ impl<'a, 'm> Search<'a, 'm> {
         let search = |index: usize| {
             let model = &self.library.models[index];
             let search = BaseSearch::new(index, model, sight, &self.settings.base_search);
-            let search = search.map(|s| if guessed { s.on_guesses() } else { s });
-            let search = search.map(|s| s.at_least(min_score).broad(breadth));
+            let search = search.map(|s| if guessed { s.on_guessed_planes() } else { s });
+            let search = search.map(|s| s.with_min_score(min_score).with_breadth(breadth));
             let found = search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default();
             self.pieces.done();
             found

@@ -1,41 +1,42 @@
-//! The fold: residual voxels of tiles in, the label of each voxel that hangs on a robot out.
+//! The step that reduces the residual voxels of all tiles to the labels of those that are attached
+//! to a robot.
 
-use crate::Settings;
+use crate::settings::Settings;
 use crate::voxel_graph::Graph;
 use contract::{Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
 use robot::Model;
 
-/// Decides what hangs on which link.
+/// Decides which residual voxels are attached to which link.
 pub struct Attach {
-    /// For each fit, for each link: whether any free joint moves it.
+    /// For each fit and each of its links: whether a free joint moves the link.
     moving: Vec<Vec<bool>>,
     settings: Settings,
 }
 
-/// Voxels gathered so far; sorted and joined now and then so that memory follows the plant, not the
-/// scans.
+/// The voxels gathered so far. They are sorted and merged from time to time, so that memory grows
+/// with the plant and not with the number of scans.
 #[derive(Debug, Default)]
 pub struct ResidualSum {
     voxels: Vec<ResidualVoxel>,
-    /// Length after the last joining.
-    joined: usize,
+    /// Number of voxels after the last merge.
+    n_merged: usize,
 }
 
-/// Below this many voxels joining early gains nothing.
-const MIN_JOINING: usize = 1 << 16;
+/// Number of voxels below which an early merge saves no memory worth its time.
+const MIN_MERGE: usize = 1 << 16;
 
 /// A component of residual voxels that touches a robot, for the report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// The moving link that it touches most.
+    /// The moving link that most of its voxels touch.
     pub link: LinkAt,
-    /// Its voxels that count as attached.
+    /// Number of voxels that are labelled as attached.
     pub n_attached: usize,
-    /// Its voxels that are left uncertain.
+    /// Number of voxels that are labelled as uncertain.
     pub n_uncertain: usize,
-    /// Points in the attached voxels.
+    /// Number of residual points in the attached voxels.
     pub n_points: u64,
-    /// Whether it also reaches something fixed and was cut.
+    /// Whether the component also reaches something fixed, so that it was cut.
     pub is_cut: bool,
 }
 
@@ -44,12 +45,12 @@ pub struct Group {
 pub struct Attached {
     /// Voxels whose label is not fixed, sorted.
     pub voxels: Vec<(Voxel, Label)>,
-    /// What was attached, by first voxel.
+    /// The components that touch a robot, sorted by their first voxel.
     pub groups: Vec<Group>,
 }
 
 impl Attached {
-    /// The label of residual points in a voxel.
+    /// The label of the residual points in a voxel: fixed where the voxel is not listed.
     #[must_use]
     pub fn label(&self, voxel: Voxel) -> Label {
         self.voxels
@@ -59,7 +60,8 @@ impl Attached {
 }
 
 impl Attach {
-    /// For these fits (the robots of the result, in its order) of these models.
+    /// Makes the step for the robots of a result, in the order of the result. `models` are those of
+    /// the library, by [`Fit::model`].
     #[must_use]
     pub fn new(fits: &[Fit], models: &[Model], settings: Settings) -> Self {
         let moving = fits.iter().map(|fit| match models.get(fit.model) {
@@ -74,13 +76,13 @@ impl Attach {
             == Some(&true)
     }
 
-    /// Labels one component; `voxels` are those of the graph.
+    /// Labels one component. `members` are indices into `voxels`, which are the nodes of `graph`.
     fn decide(
         &self,
         graph: &Graph,
         voxels: &[ResidualVoxel],
         members: &[usize],
-        ways: &mut Ways,
+        paths: &mut ShortestPaths,
         out: &mut Attached,
     ) {
         let (mut robot, mut fixed, mut marks) = (Vec::new(), Vec::new(), Vec::new());
@@ -98,20 +100,20 @@ impl Attach {
                 fixed.push((at, 0));
             }
         }
-        let Some(link) = most(&mut marks) else { return };
+        let Some(link) = most_frequent(&mut marks) else { return };
         let mut group =
             Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut: !fixed.is_empty() };
-        graph.ways(&robot, &mut ways.robot);
-        graph.ways(&fixed, &mut ways.fixed);
-        let ours: Vec<usize> = members
+        graph.shortest_paths(&robot, &mut paths.robot);
+        graph.shortest_paths(&fixed, &mut paths.fixed);
+        let of_robot: Vec<usize> = members
             .iter()
             .copied()
-            .filter(|&at| self.is_ours(&voxels[at], at, &group, ways))
+            .filter(|&at| self.belongs_to_robot(&voxels[at], at, &group, paths))
             .collect();
         let in_doubt = members.len() < self.settings.min_voxels
-            || (group.is_cut && self.is_wide(graph, &ours, ways));
-        for at in ours {
-            let mark = ways.robot[at].1;
+            || (group.is_cut && self.is_wide(graph, &of_robot, paths));
+        for at in of_robot {
+            let mark = paths.robot[at].1;
             let label = if in_doubt {
                 group.n_uncertain += 1;
                 Label::UNCERTAIN
@@ -129,28 +131,39 @@ impl Attach {
         out.groups.push(group);
     }
 
-    /// Whether a voxel is nearer to the robot than to anything fixed, along the component.
-    fn is_ours(&self, voxel: &ResidualVoxel, at: usize, group: &Group, ways: &Ways) -> bool {
+    /// Whether a voxel belongs to the robot: the path along the component to the robot is shorter
+    /// than that to anything fixed.
+    fn belongs_to_robot(
+        &self,
+        voxel: &ResidualVoxel,
+        at: usize,
+        group: &Group,
+        paths: &ShortestPaths,
+    ) -> bool {
         !group.is_cut
-            || (ways.robot[at].0 < ways.fixed[at].0 && voxel.distance <= self.settings.hold)
+            || (paths.robot[at].0 < paths.fixed[at].0 && voxel.distance <= self.settings.hold)
     }
 
-    /// Whether the border between ours and the rest is too wide for a hose.
-    fn is_wide(&self, graph: &Graph, ours: &[usize], ways: &mut Ways) -> bool {
-        for &at in ours {
-            ways.ours[at] = true;
+    /// Whether the border between the robot's voxels and the rest of the component is too wide for
+    /// a hose.
+    fn is_wide(&self, graph: &Graph, of_robot: &[usize], paths: &mut ShortestPaths) -> bool {
+        for &at in of_robot {
+            paths.of_robot[at] = true;
         }
-        let n =
-            ours.iter().filter(|at| graph.beside(**at).any(|(other, _)| !ways.ours[other])).count();
+        let n = of_robot
+            .iter()
+            .filter(|at| graph.neighbours(**at).any(|(other, _)| !paths.of_robot[other]))
+            .count();
         n as f64 * RESIDUAL_EDGE > self.settings.cut
     }
 }
 
-/// Ways from the robot and from fixed things to each voxel, and which voxels are the robot's.
-struct Ways {
+/// For each voxel the shortest path from the robot and from fixed objects, as length and mark, and
+/// whether the voxel belongs to the robot.
+struct ShortestPaths {
     robot: Vec<(u32, u32)>,
     fixed: Vec<(u32, u32)>,
-    ours: Vec<bool>,
+    of_robot: Vec<bool>,
 }
 
 impl Fold for Attach {
@@ -164,8 +177,8 @@ impl Fold for Attach {
 
     fn add(&self, sum: &mut ResidualSum, voxels: Vec<ResidualVoxel>) -> Result<()> {
         sum.voxels.extend(voxels);
-        if sum.voxels.len() > 2 * sum.joined.max(MIN_JOINING) {
-            sum.settle();
+        if sum.voxels.len() > 2 * sum.n_merged.max(MIN_MERGE) {
+            sum.merge();
         }
         Ok(())
     }
@@ -175,19 +188,23 @@ impl Fold for Attach {
     }
 
     fn finish(&self, mut sum: ResidualSum) -> Result<Attached> {
-        sum.settle();
-        // Where a link fills a voxel, what is left in it is the link's roughness, and connects
-        // nothing.
-        let rest: Vec<ResidualVoxel> =
+        sum.merge();
+        // Voxels without residual points are filled by a link. They show the roughness of the link
+        // and must not connect components.
+        let residual: Vec<ResidualVoxel> =
             sum.voxels.into_iter().filter(|v| v.n_residual > 0).collect();
-        let places: Vec<Voxel> = rest.iter().map(|v| v.voxel).collect();
+        let places: Vec<Voxel> = residual.iter().map(|v| v.voxel).collect();
         let graph = Graph::new(&places);
-        let far = (u32::MAX, u32::MAX);
-        let n = rest.len();
-        let mut ways = Ways { robot: vec![far; n], fixed: vec![far; n], ours: vec![false; n] };
+        let unreached = (u32::MAX, u32::MAX);
+        let n = residual.len();
+        let mut paths = ShortestPaths {
+            robot: vec![unreached; n],
+            fixed: vec![unreached; n],
+            of_robot: vec![false; n],
+        };
         let mut out = Attached::default();
         for members in graph.components() {
-            self.decide(&graph, &rest, &members, &mut ways, &mut out);
+            self.decide(&graph, &residual, &members, &mut paths, &mut out);
         }
         out.voxels.sort_unstable_by_key(|entry| entry.0);
         Ok(out)
@@ -195,9 +212,9 @@ impl Fold for Attach {
 }
 
 impl ResidualSum {
-    /// Sorts, and joins what is in one voxel. Joining does not depend on order, so neither does the
-    /// answer on when this happens.
-    fn settle(&mut self) {
+    /// Sorts the voxels and merges entries of the same voxel. Merging does not depend on the order,
+    /// so the result does not depend on when this is called.
+    fn merge(&mut self) {
         self.voxels.sort_by_key(|entry| entry.voxel);
         self.voxels.dedup_by(|later, kept| {
             let same = later.voxel == kept.voxel;
@@ -206,12 +223,12 @@ impl ResidualSum {
             }
             same
         });
-        self.joined = self.voxels.len();
+        self.n_merged = self.voxels.len();
     }
 }
 
-/// The mark that occurs most, the smaller of equals; `None` for none.
-fn most(marks: &mut [u32]) -> Option<LinkAt> {
+/// The link of the mark that occurs most often, the smaller of equals; `None` without marks.
+fn most_frequent(marks: &mut [u32]) -> Option<LinkAt> {
     marks.sort_unstable();
     let mut best: Option<(usize, u32)> = None;
     for run in marks.chunk_by(|a, b| a == b) {

@@ -1,26 +1,30 @@
-//! Voxels that hang on robots in; convex pieces for each link, in its frame, within a budget of
-//! triangles, out: what a planner adds to the robot's own model.
+//! Makes convex pieces of the voxels that are attached to each link of a robot, in the frame of the
+//! link. A motion planner adds them to the robot's own model. The number of triangles is bounded.
 
-use crate::Attached;
+use crate::decide::Attached;
 use contract::{Fit, PointKind, RESIDUAL_EDGE, Voxel};
 use geometry::{Point, Pose};
 use robot::{Mesh, Model};
 use std::collections::BTreeMap;
 
-/// What hangs on one robot: for links by their index, convex pieces in the link's frame.
-pub type Hanging = BTreeMap<usize, Vec<Mesh>>;
+/// What is attached to one robot: for each link by index, convex pieces in the frame of the link,
+/// metres.
+pub type AttachedPieces = BTreeMap<usize, Vec<Mesh>>;
 
-/// Edge of the cells that pieces are made of, metres: a hose's bend keeps its shape; doubled until
-/// the budget holds.
+/// Edge of the cells that attached voxels are grouped by, metres: one convex piece a cell, small
+/// enough to follow the bend of a hose. It is doubled until the number of triangles is within the
+/// limit.
 const CELL: f64 = 0.12;
-/// Triangles for all that hangs on one robot: planners check each of them against each obstacle.
+/// Limit of triangles of all that is attached to one robot. Planners check each triangle against
+/// each obstacle.
 const MAX_TRIANGLES: usize = 2000;
-/// A piece of fewer voxels is a speck.
+/// Cells with fewer voxels give no piece: they are stray points.
 const MIN_VOXELS: usize = 2;
 
-/// The pieces for each fit, in their order.
+/// The convex pieces of the attached voxels for each fit, in the order of `fits`. `models` are
+/// those of the library, by [`Fit::model`].
 #[must_use]
-pub fn hang(attached: &Attached, fits: &[Fit], models: &[Model]) -> Vec<Hanging> {
+pub fn attached_pieces(attached: &Attached, fits: &[Fit], models: &[Model]) -> Vec<AttachedPieces> {
     let mut by_robot: Vec<BTreeMap<usize, Vec<Voxel>>> = vec![BTreeMap::new(); fits.len()];
     for (voxel, label) in attached.voxels.iter().filter(|v| v.1.kind == PointKind::Attachment) {
         let (robot, link) = (usize::try_from(label.robot), usize::try_from(label.link));
@@ -33,20 +37,20 @@ pub fn hang(attached: &Attached, fits: &[Fit], models: &[Model]) -> Vec<Hanging>
     fits.iter().zip(by_robot).map(|(fit, links)| pieces(fit, &models[fit.model], &links)).collect()
 }
 
-fn pieces(fit: &Fit, model: &Model, links: &BTreeMap<usize, Vec<Voxel>>) -> Hanging {
+fn pieces(fit: &Fit, model: &Model, links: &BTreeMap<usize, Vec<Voxel>>) -> AttachedPieces {
     let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     let poses = model.poses(&posture);
     let mut cell = CELL;
     loop {
-        let all: Hanging = links
+        let all: AttachedPieces = links
             .iter()
             .filter_map(|(&link, voxels)| {
                 let link_from_world = (fit.world_from_base * poses.get(link)?).inverse();
-                Some((link, of_link(voxels, &link_from_world, cell)))
+                Some((link, link_pieces(voxels, &link_from_world, cell)))
             })
             .collect();
         let n: usize = all.values().flatten().map(|mesh| mesh.triangles.len()).sum();
-        // At 2 m everything is one piece a link.
+        // Above 2 m all voxels of a link are in one cell, so that a larger cell changes nothing.
         if n <= MAX_TRIANGLES || cell > 2.0 {
             return all;
         }
@@ -54,8 +58,9 @@ fn pieces(fit: &Fit, model: &Model, links: &BTreeMap<usize, Vec<Voxel>>) -> Hang
     }
 }
 
-/// Hulls of the voxels of each cell of the link's frame.
-fn of_link(voxels: &[Voxel], link_from_world: &Pose, cell: f64) -> Vec<Mesh> {
+/// The convex hulls of the voxels of one link: one hull for each cell of the link's frame. `cell`
+/// is the edge of the cells, metres.
+fn link_pieces(voxels: &[Voxel], link_from_world: &Pose, cell: f64) -> Vec<Mesh> {
     let mut cells: BTreeMap<[i64; 3], (usize, Vec<[f32; 3]>)> = BTreeMap::new();
     for voxel in voxels {
         let corner = |k: usize| {

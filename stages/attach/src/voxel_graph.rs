@@ -1,23 +1,24 @@
-//! Voxels as a graph of 26 neighbours: sorted voxels in; components and shortest ways out.
+//! The graph of occupied voxels, each connected to its up to 26 neighbours: connected components,
+//! and shortest paths from several seeds.
 
 use contract::Voxel;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
-/// Neighbours of each voxel of a sorted list.
+/// The neighbours of each voxel of a sorted list.
 pub(crate) struct Graph {
     /// Neighbours of voxel `i` are `to[starts[i]..starts[i + 1]]`, ascending.
     starts: Vec<usize>,
     to: Vec<u32>,
-    /// Length of each step in hundredths of an edge: whole numbers keep sums exact and ties alike
-    /// everywhere.
+    /// Length of the edge to each neighbour in `to`, in hundredths of a voxel's edge. Integers make
+    /// sums exact and ties the same on every machine.
     steps: Vec<u32>,
 }
 
 impl Graph {
-    /// The graph of voxels, each once.
+    /// Makes the graph of distinct voxels.
     pub(crate) fn new(voxels: &[Voxel]) -> Self {
-        // Only looked up, never walked: its order cannot reach the answer.
+        // The map is only looked up and never iterated, so that its order cannot affect the result.
         let index: HashMap<Voxel, u32> =
             voxels.iter().enumerate().map(|(i, v)| (*v, i as u32)).collect();
         let mut graph = Self { starts: vec![0], to: Vec::new(), steps: Vec::new() };
@@ -41,13 +42,15 @@ impl Graph {
         self.starts.len() - 1
     }
 
-    /// Neighbours of a voxel and the steps to them, hundredths of an edge.
-    pub(crate) fn beside(&self, at: usize) -> impl Iterator<Item = (usize, u32)> + '_ {
+    /// The neighbours of a voxel by index, with the length of each edge in hundredths of a voxel's
+    /// edge.
+    pub(crate) fn neighbours(&self, at: usize) -> impl Iterator<Item = (usize, u32)> + '_ {
         let range = self.starts[at]..self.starts[at + 1];
         self.to[range.clone()].iter().map(|t| *t as usize).zip(self.steps[range].iter().copied())
     }
 
-    /// Connected components, each with ascending members, by their first member.
+    /// The connected components. Members ascend within each; components are sorted by their first
+    /// member.
     pub(crate) fn components(&self) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.len()];
         let mut out = Vec::new();
@@ -59,7 +62,7 @@ impl Graph {
             let mut members = vec![start];
             let mut next = 0;
             while next < members.len() {
-                for (other, _) in self.beside(members[next]) {
+                for (other, _) in self.neighbours(members[next]) {
                     if !seen[other] {
                         seen[other] = true;
                         members.push(other);
@@ -73,26 +76,27 @@ impl Graph {
         out
     }
 
-    /// Length of the shortest way from any seed (hundredths of an edge, `u32::MAX` where there is
-    /// none) and which seed's `mark` it comes from; equal ways go to the smaller mark. Works
-    /// inside what the seeds reach.
-    pub(crate) fn ways(&self, seeds: &[(usize, u32)], ways: &mut [(u32, u32)]) {
+    /// Updates, for each voxel, the length of the shortest path from any seed (hundredths of a
+    /// voxel's edge; `u32::MAX` where no seed is connected) and the `mark` of that seed. Of equally
+    /// long paths the smaller mark is kept. Seeds are pairs of voxel index and mark. Only voxels
+    /// that the seeds reach are changed.
+    pub(crate) fn shortest_paths(&self, seeds: &[(usize, u32)], shortest_paths: &mut [(u32, u32)]) {
         let mut heap = BinaryHeap::new();
         for &(at, mark) in seeds {
-            if (0, mark) < ways[at] {
-                ways[at] = (0, mark);
+            if (0, mark) < shortest_paths[at] {
+                shortest_paths[at] = (0, mark);
                 heap.push(Reverse((0, mark, at)));
             }
         }
         while let Some(Reverse((length, mark, at))) = heap.pop() {
-            if (length, mark) > ways[at] {
+            if (length, mark) > shortest_paths[at] {
                 continue;
             }
-            for (other, step) in self.beside(at) {
-                let way = (length.saturating_add(step), mark);
-                if way < ways[other] {
-                    ways[other] = way;
-                    heap.push(Reverse((way.0, mark, other)));
+            for (other, step) in self.neighbours(at) {
+                let path = (length.saturating_add(step), mark);
+                if path < shortest_paths[other] {
+                    shortest_paths[other] = path;
+                    heap.push(Reverse((path.0, mark, other)));
                 }
             }
         }

@@ -1,34 +1,34 @@
-//! A cluster in; out come the boxes of what may be bodies in it: the whole of a small one; of
-//! walls, fences and what touches them, the parts that are not flat.
+//! Finds the boxes of possible bodies in a cluster: all of a small cluster; of walls, fences and
+//! what touches them, the parts that are not flat.
 
 use contract::{Cluster, Voxel};
 use geometry::{Aabb, Vector};
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 
-use crate::RegionSettings;
+use crate::settings::RegionSettings;
 
-/// Edge of the columns that structure is cut into, metres: no robot is flat over so much.
+/// Edge of the columns that a structure is cut into, metres. No robot is flat over this length.
 const COLUMN: f64 = 1.0;
-/// Structure higher than this above its lowest point is no robot's, metres: ceilings, crane ways.
+/// Height above the lowest point of a structure beyond which voxels are ignored, metres: ceilings
+/// and crane runways.
 const MAX_HEIGHT: f64 = 3.6;
-/// Thickness below which a column is a wall, fence or panel, metres, one sigma: voxels of 5 cm make
-/// a plane 2 cm thick.
+/// Thickness of a column (one standard deviation, metres) below which it is a wall, fence or panel:
+/// voxels of 5 cm give a plane 2 cm.
 const FLAT: f64 = 0.045;
-/// Share of a column's voxels that two upright planes may leave over where walls meet.
+/// Where walls meet: largest share of a column's voxels that lie on neither of two upright planes.
 const MAX_SHARE_LEFT_OVER: f64 = 0.08;
-/// Most voxels of a column that two upright planes may leave over where walls meet, however large
-/// their share is.
+/// Where walls meet: limit of these voxels, however small their share is.
 const MAX_LEFT_OVER: f64 = 60.0;
-/// Lowest corner of a room, metres: lower ones may be the body of a machine.
+/// Least height of a corner of a room, metres. A lower one may be the body of a machine.
 const MIN_CORNER: f64 = 2.4;
-/// Pairs of voxels that are tried for a plane through them.
+/// Number of pairs of voxels that are tried for a plane through them.
 const N_PAIRS: usize = 48;
-/// Fewest voxels of a column that is not flat.
+/// Fewest voxels of a column that is not discarded.
 const MIN_VOXELS: usize = 12;
 
-/// Boxes and numbers of points.
-pub(crate) fn bodies(cluster: &Cluster, settings: &RegionSettings) -> Vec<(Aabb, u64)> {
+/// The boxes of possible bodies (world frame, metres), each with its number of points.
+pub(crate) fn body_boxes(cluster: &Cluster, settings: &RegionSettings) -> Vec<(Aabb, u64)> {
     let size = cluster.bounds.size();
     if size[0].max(size[1]) <= settings.max_body {
         return vec![(cluster.bounds, cluster.n_points)];
@@ -66,7 +66,7 @@ pub(crate) fn bodies(cluster: &Cluster, settings: &RegionSettings) -> Vec<(Aabb,
     out
 }
 
-/// Whether voxels lie on one upright plane.
+/// Whether the voxels of a column lie on one plane.
 fn is_flat(voxels: &[Voxel], edge: f64) -> bool {
     let n = voxels.len() as f64;
     let at = |v: &Voxel| Vector::from(v.map(f64::from)) * edge;
@@ -76,7 +76,7 @@ fn is_flat(voxels: &[Voxel], edge: f64) -> bool {
     (spread / n).symmetric_eigenvalues().min().max(0.0).sqrt() < FLAT
 }
 
-/// Voxels above each other.
+/// A pile: the voxels above each other at one place on the ground.
 #[derive(Debug, Clone, Copy)]
 struct Pile {
     at: [f64; 2],
@@ -85,7 +85,7 @@ struct Pile {
     high: i32,
 }
 
-/// Whether voxels lie on two high upright planes, as where walls meet.
+/// Whether the voxels of a column lie on two high upright planes, as where walls meet.
 fn is_corner(voxels: &[Voxel], edge: f64) -> bool {
     let mut piles: BTreeMap<[i32; 2], Pile> = BTreeMap::new();
     for v in voxels {
@@ -109,7 +109,7 @@ fn is_corner(voxels: &[Voxel], edge: f64) -> bool {
     over <= (MAX_SHARE_LEFT_OVER * voxels.len() as f64).min(MAX_LEFT_OVER)
 }
 
-/// A line seen from above.
+/// A line on the ground.
 #[derive(Debug, Clone, Copy)]
 struct GroundLine {
     /// A point on it, metres.
@@ -124,9 +124,9 @@ fn is_off(pile: &Pile, line: &GroundLine) -> bool {
     off.abs() > 2.0 * FLAT
 }
 
-/// The line that the fewest voxels are off, through two of them.
+/// The line through two piles that the fewest voxels lie off.
 fn best_line(piles: &[Pile]) -> Option<GroundLine> {
-    // Pairs far apart in the order of the voxels are far apart in space.
+    // Voxels far from each other in their order are far from each other in space.
     let n = piles.len();
     let pair = |k: usize| (piles[k * n / N_PAIRS].at, piles[(k * n / N_PAIRS + n / 2) % n].at);
     let lines = (0..if n > 0 { N_PAIRS } else { 0 }).map(pair).filter_map(|(a, b)| {
@@ -146,7 +146,7 @@ mod tests {
 
     /// A box-shaped hall of walls with a body of 1 × 1 × 1.5 m that touches one of them.
     #[test]
-    fn walls_are_left_out_and_what_touches_them_is_kept() {
+    fn walls_are_left_out_and_objects_that_touch_them_are_kept() {
         let mut voxels = Vec::new();
         for k in 0..80 {
             for i in 0..400 {
@@ -169,13 +169,13 @@ mod tests {
         let bounds = Aabb { min: [0.0; 3], max: [20.0, 20.0, 4.0] };
         let n_points = voxels.len() as u64;
         let cluster = Cluster { id: 0, voxels, edge, n_points, bounds };
-        let found = bodies(&cluster, &RegionSettings::default());
+        let found = body_boxes(&cluster, &RegionSettings::default());
         let body = Aabb { min: [10.0, 0.05, 0.0], max: [11.0, 1.05, 1.5] };
         let holds = |b: &Aabb| {
             (0..3).all(|i| b.min[i] <= body.min[i] + 0.2 && b.max[i] >= body.max[i] - 0.2)
         };
         assert_eq!(found.iter().filter(|(b, _)| holds(b)).count(), 1, "{found:?}");
-        // Nothing beside it, not even the corners of the hall.
+        // There is nothing else, not even the corners of the hall.
         assert_eq!(found.len(), 1, "{found:?}");
     }
 }

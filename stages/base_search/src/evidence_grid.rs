@@ -1,5 +1,5 @@
-//! The evidence of a region in; out comes a grid of it: what the beams say about each place, looked
-//! up once for all models and all base poses of a search instead of once for each sample.
+//! A voxel grid of the evidence in a region. What the beams show about each place is looked up once
+//! for all models and base poses of a search, instead of once for each sample.
 
 use contract::{Fan, Region};
 use geometry::depth::{LANES, Looks, lanes};
@@ -9,67 +9,68 @@ use std::sync::OnceLock;
 
 use crate::score_grid::{SCORE_UNIT, ScoreGrid, UNJUDGED};
 
-/// Edge of a cell, and of the cubes of points, metres: half of the finest tolerance that is asked
-/// of it.
+/// Edge of a cell, and of the cubes that points are counted in, metres: half of the finest
+/// tolerance of a quick score.
 pub(crate) const EDGE: f32 = 0.03;
-/// Most cells; a larger region gets larger ones.
+/// Limit of the cells; a larger region has larger ones.
 const MAX_CELLS: f64 = 16e6;
-/// Least tolerance, in cells, for which the grid is asked.
+/// Least tolerance that the grid serves, as a multiple of a cell's edge.
 pub(crate) const COARSE: f32 = 1.4;
-/// Tolerances that the grid is asked for, from the least on, each so many times the one before: a
-/// twentieth more or less than was asked for tells no place from another.
+/// Ratio of neighbouring tolerances that the grid has scores for. A twentieth more or less than the
+/// requested tolerance does not change which place is best.
 pub(crate) const RUNG: f32 = 1.1;
 const N_RUNGS: usize = 16;
 /// Unit of the distances in a cell, metres.
 const UNIT: f32 = 0.004;
-/// In `off`: no beam got near. In `ahead`: beams went there and none came back.
+/// In `distance`: no beam ended near. In `beyond`: beams went there and none returned.
 const NOTHING: u8 = 255;
 
-/// What is known of one place.
+/// The evidence at one place.
 #[derive(Debug, Clone, Copy)]
 struct EvidenceCell {
-    /// By how much the beam that went farthest went on beyond it, in units; 0 for none.
-    ahead: u8,
-    /// Distance from the nearest end of a beam along it, in units.
-    off: u8,
+    /// Distance beyond the place at which the farthest beam ended, in units; 0 if none ended beyond
+    /// it.
+    beyond: u8,
+    /// Distance along a beam to the nearest end of one, in units.
+    distance: u8,
 }
 
 impl EvidenceCell {
-    /// What a sample at such a place scores, without regard to the side from which a beam comes, in
-    /// [`SCORE_UNIT`]s.
+    /// Score of a sample at such a place, in [`SCORE_UNIT`]s, whatever the direction of the beam
+    /// is.
     fn score(self, tolerance: f32) -> i8 {
-        let through = match self.ahead {
+        let through = match self.beyond {
             NOTHING => NO_RETURN_WEIGHT,
-            ahead => ((f32::from(ahead) * UNIT - tolerance) / tolerance).clamp(0.0, 1.0),
+            beyond => ((f32::from(beyond) * UNIT - tolerance) / tolerance).clamp(0.0, 1.0),
         };
-        let on = match self.off {
+        let on = match self.distance {
             NOTHING => 0.0,
-            off => 1.0 - f32::from(off) * UNIT / tolerance,
+            distance => 1.0 - f32::from(distance) * UNIT / tolerance,
         };
         let mut probe = Probe::default();
         probe.count(through, on);
         match (probe.score / SCORE_UNIT).round() as i8 {
             _ if probe.n_seen == 0 => UNJUDGED,
-            // Only what is hidden scores this.
+            // This value is reserved for hidden places.
             UNJUDGED => UNJUDGED - 1,
             score => score,
         }
     }
 }
 
-/// A grid of evidence in the local frame.
+/// A grid of evidence in the region's frame.
 #[derive(Debug)]
 pub(crate) struct EvidenceGrid {
     min: [f32; 3],
     pub(crate) edge: f32,
     n: [usize; 3],
     cells: Vec<EvidenceCell>,
-    /// What each cell scores, for each rung of tolerance that was asked for.
+    /// The score of each cell for each of the tolerances, computed when first requested.
     scores: [OnceLock<Vec<i8>>; N_RUNGS],
 }
 
 impl EvidenceGrid {
-    /// The region's grid; `None` where there are no beams.
+    /// Makes the grid of a region; `None` if the evidence has no beams.
     pub(crate) fn new(region: &Region, evidence: &Evidence<'_>, fan: &dyn Fan) -> Option<Self> {
         if !evidence.has_beams() {
             return None;
@@ -80,16 +81,16 @@ impl EvidenceGrid {
         let n = size.map(|s| (s / f64::from(edge)).ceil().max(1.0) as usize);
         let min = region.bounds.min.map(|v| v as f32);
         let middle = |i: usize, of: usize| min[i] + (of as f32 + 0.5) * edge;
-        // Cells beside each other are asked together.
+        // Neighbouring cells are looked up together.
         let layer = |k: usize| -> Vec<EvidenceCell> {
             let mut layer = Vec::with_capacity(n[0] * n[1]);
             for (j, first) in (0..n[1]).flat_map(|j| (0..n[0]).step_by(LANES).map(move |i| (j, i)))
             {
                 let place = |lane: usize| [middle(0, first + lane), middle(1, j), middle(2, k)];
                 let local = lanes(&std::array::from_fn::<_, LANES, _>(place));
-                let mut known = GatheredBeams::default();
-                evidence.eyes().iter().for_each(|eye| known.add(&eye.look_lanes(&local, edge)));
-                let packed = known.packed();
+                let mut gathered = GatheredBeams::default();
+                evidence.eyes().iter().for_each(|eye| gathered.add(&eye.look_lanes(&local, edge)));
+                let packed = gathered.packed();
                 layer.extend_from_slice(&packed[..LANES.min(n[0] - first)]);
             }
             layer
@@ -98,7 +99,8 @@ impl EvidenceGrid {
         Some(Self { min, edge, n, cells, scores: Default::default() })
     }
 
-    /// The grid at the rung nearest to a tolerance; `None` where it is too fine to be asked.
+    /// The scores at the available tolerance nearest to the requested one (metres); `None` if that
+    /// is too fine for the grid.
     pub(crate) fn at_tolerance(&self, tolerance: f32) -> Option<ScoreGrid<'_>> {
         let least = COARSE * self.edge;
         if tolerance < least {
@@ -113,25 +115,26 @@ impl EvidenceGrid {
 
     /// The scores of all cells at a tolerance.
     fn score(&self, tolerance: f32) -> Vec<i8> {
-        let of =
-            |at: usize| EvidenceCell { ahead: (at >> 8) as u8, off: at as u8 }.score(tolerance);
+        let of = |at: usize| {
+            EvidenceCell { beyond: (at >> 8) as u8, distance: at as u8 }.score(tolerance)
+        };
         let all: Vec<i8> = (0..1 << 16).map(of).collect();
-        let score = |c: &EvidenceCell| all[usize::from(c.ahead) << 8 | usize::from(c.off)];
+        let score = |c: &EvidenceCell| all[usize::from(c.beyond) << 8 | usize::from(c.distance)];
         self.cells.iter().map(score).collect()
     }
 }
 
-/// What the scans say about places beside each other, being gathered.
+/// The evidence of scans about neighbouring places, while it is gathered.
 #[derive(Debug, Clone, Copy)]
 struct GatheredBeams {
-    ahead: [f32; LANES],
-    off: [f32; LANES],
+    beyond: [f32; LANES],
+    distance: [f32; LANES],
     is_silent: [bool; LANES],
 }
 
 impl Default for GatheredBeams {
     fn default() -> Self {
-        Self { ahead: [0.0; LANES], off: [f32::INFINITY; LANES], is_silent: [false; LANES] }
+        Self { beyond: [0.0; LANES], distance: [f32::INFINITY; LANES], is_silent: [false; LANES] }
     }
 }
 
@@ -141,14 +144,14 @@ impl GatheredBeams {
         for i in 0..LANES {
             let [near, far, range] = [looks.near[i], looks.far[i], looks.range[i]];
             let is_known = !near.is_nan();
-            let ahead = looks.around[i] - range;
-            let is_silent = ahead == f32::INFINITY;
-            let off = (near - range).abs().min((far - range).abs());
+            let beyond = looks.around[i] - range;
+            let is_silent = beyond == f32::INFINITY;
+            let distance = (near - range).abs().min((far - range).abs());
             self.is_silent[i] |= is_known & is_silent;
-            // `max` and `min` pass NaN over.
-            let ahead = if is_known & !is_silent { ahead } else { f32::NAN };
-            self.ahead[i] = self.ahead[i].max(ahead);
-            self.off[i] = self.off[i].min(if is_known { off } else { f32::NAN });
+            // `max` and `min` ignore NaN.
+            let beyond = if is_known & !is_silent { beyond } else { f32::NAN };
+            self.beyond[i] = self.beyond[i].max(beyond);
+            self.distance[i] = self.distance[i].min(if is_known { distance } else { f32::NAN });
         }
     }
 
@@ -156,10 +159,14 @@ impl GatheredBeams {
     fn packed(&self) -> [EvidenceCell; LANES] {
         let units = |v: f32| ((v / UNIT) as u32).min(u32::from(NOTHING) - 1) as u8;
         std::array::from_fn(|i| {
-            let is_silent = self.is_silent[i] && self.ahead[i] <= 0.0;
+            let is_silent = self.is_silent[i] && self.beyond[i] <= 0.0;
             EvidenceCell {
-                ahead: if is_silent { NOTHING } else { units(self.ahead[i]) },
-                off: if self.off[i].is_finite() { units(self.off[i]) } else { NOTHING },
+                beyond: if is_silent { NOTHING } else { units(self.beyond[i]) },
+                distance: if self.distance[i].is_finite() {
+                    units(self.distance[i])
+                } else {
+                    NOTHING
+                },
             }
         })
     }

@@ -1,81 +1,90 @@
-//! A base pose under test in; out comes what the first moving link, swept over its joint, says of
-//! it: many a box looks like a foot, but few look like a foot with a carousel on it.
+//! Scores base poses by the first moving link, swept over the range of its joint. Many boxes have
+//! the shape of a robot's base, but few have the shape of a base with a carousel on it.
 
 use geometry::{Plane, Pose, Probe};
 use std::f64::consts::TAU;
 
 use crate::first_link::FirstLink;
 use crate::problem::BaseSearch;
-use crate::trial::{BaseTrial, LAG, SampleScore, Samples, of_judged};
+use crate::trial::{BaseTrial, MAX_LAG, SampleScore, Samples, judged_score};
 
-/// Tolerance at which a base is judged in the end, metres: half a step of the finest grid.
+/// Tolerance of the final test of a base, metres: half a step of the finest grid.
 const BASE_TOLERANCE: f32 = 0.04;
-/// Tolerance at which a first link is judged in the end, metres: that of the base, and the steps of
-/// its joint.
+/// Tolerance of the final test of a first link, metres: that of the base, plus the step between
+/// values of its joint.
 const FIRST_LINK_TOLERANCE: f32 = 0.06;
-/// Least mean score of what could be judged of the worse of base and first link. Of 125 robots that
-/// were found none is below 0.64.
+/// Least mean score of the judged samples of base and first link, whichever is worse. The smallest
+/// value of 125 robots that were found is 0.64.
 const MIN_JUDGED_SCORE: f64 = 0.5;
-/// Least mean of both of these scores. Of 125 robots that were found none is below 0.70.
+/// Least mean of both of these scores. The smallest value of 125 robots that were found is 0.70.
 const MIN_MEAN_JUDGED_SCORE: f64 = 0.58;
-/// Base poses of a place that are asked for that.
+/// Number of base poses of a place that are tested.
 const N_JUDGED_POSES: usize = 4;
-/// Share of a foot's surface up to which beams judged little of it.
+/// Share of judged samples up to which beams determine the yaw of a base too weakly.
 const LITTLE_SEEN: f32 = 0.3;
-/// Yaws that such a foot is tried at: every 5°.
+/// Number of yaw angles that are tried for such a base: every 5°.
 const N_YAWS: i32 = 72;
-/// Values of the first joint that are looked at with all samples at a glance.
-const N_GLANCES: usize = 6;
-/// Of those so many are kept while a base is moved about.
+/// Number of values of the first joint that get a quick score with all samples.
+const N_QUICK_VALUES: usize = 6;
+/// Number of likely values of the first joint that are kept while a base is moved.
 const N_LIKELY: usize = 3;
-/// Tolerance of the first link, as a multiple of the base's: its joint has steps, too.
-const FIRST_REACH: f32 = 1.5;
+/// Tolerance of the first link as a multiple of the base's: its joint has steps, too.
+const FIRST_LINK_REACH: f32 = 1.5;
 
 impl BaseSearch<'_> {
-    /// Whether what could be judged of the base and of the first link fits them: much of a cabinet
-    /// has the height of a foot, but not its shape.
-    fn is_like(&self, plane: &Plane, trial: &BaseTrial) -> bool {
+    /// Whether the judged samples of base and first link fit the beams. Large parts of a cabinet
+    /// have the height of a base, but not its shape.
+    fn is_plausible(&self, plane: &Plane, trial: &BaseTrial) -> bool {
         if !self.region.evidence.has_beams() {
             return true;
         }
         let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
-        let base = of_judged(&self.probe_base(plane, trial));
+        let base = judged_score(&self.probe_base(plane, trial));
         if base < MIN_JUDGED_SCORE {
             return false;
         }
         let first = self.first.as_ref().map_or(base, |first| {
-            if !self.region.each.is_empty() {
-                return of_judged(&self.first_apart(&local_from_root, first, FIRST_LINK_TOLERANCE));
+            if !self.region.by_scan.is_empty() {
+                return judged_score(&self.probe_first_by_scan(
+                    &local_from_root,
+                    first,
+                    FIRST_LINK_TOLERANCE,
+                ));
             }
             let samples = Samples::first(self.model, first.link, self.settings.n_coarse);
             let probe = |pose| samples.probe(self.region.evidence, pose, FIRST_LINK_TOLERANCE);
             let poses = first.poses(&local_from_root);
             let probes = poses.iter().map(probe);
             let best = probes.max_by(|a, b| self.region.mean(a).total_cmp(&self.region.mean(b)));
-            best.map_or(base, |probe| of_judged(&probe))
+            best.map_or(base, |probe| judged_score(&probe))
         });
         base.min(first) >= MIN_JUDGED_SCORE && 0.5 * (base + first) >= MIN_MEAN_JUDGED_SCORE
     }
 
-    /// Whether a base pose of a place looks like the robot, perhaps one that is added. The best may
-    /// be the right place turned wrongly: a foot of which plates leave little says less of its
-    /// yaw than what stands on it, so it is turned to where that little fits, and goes first.
+    /// Whether one of the best base poses of a place is plausible; another one may be added in
+    /// front. The best pose may stand at the right place with a wrong yaw: of a base that plates
+    /// mostly hide, the samples determine the yaw less than the links above it. Such a base is also
+    /// tried at the yaw that its judged samples fit best.
     pub(crate) fn accept(&self, local: &[Plane], place: &mut Vec<BaseTrial>) -> bool {
-        if place.iter().take(N_JUDGED_POSES).any(|trial| self.is_like(&local[trial.plane], trial)) {
+        if place
+            .iter()
+            .take(N_JUDGED_POSES)
+            .any(|trial| self.is_plausible(&local[trial.plane], trial))
+        {
             return true;
         }
         let Some(best) = place.first().copied() else { return false };
         let plane = &local[best.plane];
-        if !self.region.each.is_empty() || self.probe_base(plane, &best).seen() > LITTLE_SEEN {
+        if !self.region.by_scan.is_empty() || self.probe_base(plane, &best).seen() > LITTLE_SEEN {
             return false;
         }
         let turned = (1..N_YAWS).map(|k| {
             let trial =
                 BaseTrial { yaw: best.yaw + TAU * f64::from(k) / f64::from(N_YAWS), ..best };
-            (of_judged(&self.probe_base(plane, &trial)), trial)
+            (judged_score(&self.probe_base(plane, &trial)), trial)
         });
         let turned = turned.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, trial)| trial);
-        let found = turned.filter(|trial| self.is_like(plane, trial));
+        let found = turned.filter(|trial| self.is_plausible(plane, trial));
         found.into_iter().for_each(|trial| place.insert(0, trial));
         found.is_some()
     }
@@ -86,69 +95,77 @@ impl BaseSearch<'_> {
         samples.probe(self.region.evidence, &pose, BASE_TOLERANCE)
     }
 
-    /// The trial with the score of the base and of the first moving link at its best joint value.
-    pub(crate) fn with_first(&self, plane: &Plane, trial: BaseTrial, tolerance: f32) -> BaseTrial {
-        let own = self.score_base(plane, &trial, tolerance, self.settings.n_fine);
-        let Some(of_first) = &self.first else { return BaseTrial { said: own, ..trial } };
-        let tolerance = FIRST_REACH * tolerance;
-        let first = if self.region.each.is_empty() {
-            let samples = Samples::first(self.model, of_first.link, self.settings.n_coarse);
-            let (poses, few) = self.sweep(plane, &trial, of_first, tolerance);
-            let least = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - LAG;
-            let full = poses.iter().zip(&few).filter(|(_, few)| **few >= least);
-            let said =
-                |p: &Pose| self.region.said(&samples.probe(self.region.evidence, p, tolerance));
-            highest(full.map(|(p, _)| said(p)))
-        } else {
-            let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
-            let probe = self.first_apart(&local_from_base, of_first, tolerance);
-            // Each scan sees less than half of it.
-            SampleScore::of(&probe, of_judged(&probe) * (2.0 * f64::from(probe.seen())).min(1.0))
-        };
-        BaseTrial { said: self.joined(own, first), first, ..trial }
-    }
-
-    /// The same at a glance, to whatever score the base has already.
-    pub(crate) fn glance_at_first(
+    /// Returns the trial with the combined score of the base and of the first moving link at its
+    /// best joint value. `tolerance` is in metres.
+    pub(crate) fn with_first_link(
         &self,
         plane: &Plane,
         trial: BaseTrial,
         tolerance: f32,
     ) -> BaseTrial {
-        let Some(of_first) = self.first.as_ref().filter(|_| self.region.each.is_empty()) else {
-            return trial;
+        let of_base = self.score_base(plane, &trial, tolerance, self.settings.n_fine);
+        let Some(first_link) = &self.first else { return BaseTrial { rating: of_base, ..trial } };
+        let tolerance = FIRST_LINK_REACH * tolerance;
+        let first = if self.region.by_scan.is_empty() {
+            let samples = Samples::first(self.model, first_link.link, self.settings.n_coarse);
+            let (poses, quick_scores) = self.sweep(plane, &trial, first_link, tolerance);
+            let least = quick_scores.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - MAX_LAG;
+            let full = poses.iter().zip(&quick_scores).filter(|(_, score)| **score >= least);
+            let rating =
+                |p: &Pose| self.region.rating(&samples.probe(self.region.evidence, p, tolerance));
+            highest(full.map(|(p, _)| rating(p)))
+        } else {
+            let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
+            let probe = self.probe_first_by_scan(&local_from_base, first_link, tolerance);
+            // Each scan sees less than half of the link.
+            SampleScore::of(&probe, judged_score(&probe) * (2.0 * f64::from(probe.seen())).min(1.0))
         };
-        let samples = Samples::first(self.model, of_first.link, self.settings.n_coarse);
-        let (poses, few) = self.sweep(plane, &trial, of_first, tolerance);
-        let mut best: Vec<usize> = (0..few.len()).collect();
-        best.sort_by(|a, b| few[*b].total_cmp(&few[*a]));
-        let said = |k: &usize| self.region.glance(samples, &poses[*k], tolerance);
-        let first = highest(best.iter().take(N_GLANCES).map(said));
-        BaseTrial { said: self.joined(trial.said, first), first, ..trial }
+        BaseTrial { rating: self.combined(of_base, first), first, ..trial }
     }
 
-    /// Poses of the first link in the root's frame that a few samples of it like best where the
-    /// robot stands so; none where each scan is asked by itself, and none on guessed heights: a
-    /// camera sees too little of it (of twelve frames one was found, four without).
-    pub(crate) fn likely_firsts(
+    /// Like [`Self::with_first_link`], but with quick scores and the score that the base has
+    /// already.
+    pub(crate) fn quick_with_first_link(
+        &self,
+        plane: &Plane,
+        trial: BaseTrial,
+        tolerance: f32,
+    ) -> BaseTrial {
+        let Some(first_link) = self.first.as_ref().filter(|_| self.region.by_scan.is_empty())
+        else {
+            return trial;
+        };
+        let samples = Samples::first(self.model, first_link.link, self.settings.n_coarse);
+        let (poses, quick_scores) = self.sweep(plane, &trial, first_link, tolerance);
+        let mut best: Vec<usize> = (0..quick_scores.len()).collect();
+        best.sort_by(|a, b| quick_scores[*b].total_cmp(&quick_scores[*a]));
+        let rating = |k: &usize| self.region.quick_score(samples, &poses[*k], tolerance);
+        let first = highest(best.iter().take(N_QUICK_VALUES).map(rating));
+        BaseTrial { rating: self.combined(trial.rating, first), first, ..trial }
+    }
+
+    /// The likely poses of the first link in the root's frame, by quick scores of few samples at
+    /// the trial's base pose. There are none if scans are scored one by one. There are none for
+    /// guessed planes either, where a camera sees too little of the link (with them one of twelve
+    /// frames was found, without them four).
+    pub(crate) fn likely_first_links(
         &self,
         plane: &Plane,
         trial: &BaseTrial,
         tolerance: f32,
     ) -> Vec<Pose> {
-        let is_asked = self.region.each.is_empty() && !self.is_guess;
-        let Some(first) = self.first.as_ref().filter(|_| is_asked) else {
+        let is_scored = self.region.by_scan.is_empty() && !self.is_guess;
+        let Some(first) = self.first.as_ref().filter(|_| is_scored) else {
             return Vec::new();
         };
-        let (_, few) = self.sweep(plane, trial, first, FIRST_REACH * tolerance);
-        let mut best: Vec<usize> = (0..few.len()).collect();
-        best.sort_by(|a, b| few[*b].total_cmp(&few[*a]));
+        let (_, quick_scores) = self.sweep(plane, trial, first, FIRST_LINK_REACH * tolerance);
+        let mut best: Vec<usize> = (0..quick_scores.len()).collect();
+        best.sort_by(|a, b| quick_scores[*b].total_cmp(&quick_scores[*a]));
         best.into_iter().take(N_LIKELY).map(|k| first.root_from_link[k]).collect()
     }
 
-    /// What a few samples of the first link say at a glance at the best of some poses in the root's
-    /// frame.
-    pub(crate) fn glance_at(
+    /// Quick score of few samples of the first link at the best of some poses in the root's frame.
+    pub(crate) fn quick_first_score(
         &self,
         plane: &Plane,
         trial: &BaseTrial,
@@ -158,22 +175,26 @@ impl BaseSearch<'_> {
         let Some(first) = &self.first else { return SampleScore::default() };
         let samples = Samples::first(self.model, first.link, self.settings.n_coarse / 4);
         let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
-        let said = |pose: &Pose| {
-            self.region.glance(samples, &(local_from_root * pose), FIRST_REACH * tolerance)
+        let rating = |pose: &Pose| {
+            self.region.quick_score(
+                samples,
+                &(local_from_root * pose),
+                FIRST_LINK_REACH * tolerance,
+            )
         };
-        highest(root_from_links.iter().map(said))
+        highest(root_from_links.iter().map(rating))
     }
 
-    /// What base and first link say, each with the root of its area.
-    pub(crate) fn joined(&self, base: SampleScore, first: SampleScore) -> SampleScore {
+    /// The combined score of base and first link, each weighted by the square root of its area.
+    pub(crate) fn combined(&self, base: SampleScore, first: SampleScore) -> SampleScore {
         let weight = |l: usize| f64::from(self.model.links[l].cad.area).sqrt();
         let weights = (weight(self.base), self.first.as_ref().map_or(0.0, |f| weight(f.link)));
         let mean = |a: f64, b: f64| (weights.0 * a + weights.1 * b) / (weights.0 + weights.1);
         SampleScore { score: mean(base.score, first.score), seen: mean(base.seen, first.seen) }
     }
 
-    /// Poses of the first link over its joint, and what a few samples say of each: most are
-    /// hopeless.
+    /// The poses of the first link over the range of its joint, with a quick score of few samples
+    /// for each. Most of them score too low to be tested further.
     fn sweep(
         &self,
         plane: &Plane,
@@ -182,18 +203,24 @@ impl BaseSearch<'_> {
         tolerance: f32,
     ) -> (Vec<Pose>, Vec<f64>) {
         let poses = first.poses(&self.pose(plane, trial.x, trial.y, trial.yaw));
-        let some = Samples::first(self.model, first.link, self.settings.n_coarse / 4);
-        let few = |pose: &Pose| self.region.glance(some, pose, tolerance).score;
-        let few = poses.iter().map(few).collect();
-        (poses, few)
+        let samples = Samples::first(self.model, first.link, self.settings.n_coarse / 4);
+        let score = |pose: &Pose| self.region.quick_score(samples, pose, tolerance).score;
+        let quick_scores = poses.iter().map(score).collect();
+        (poses, quick_scores)
     }
 
-    /// What the scans say of the first moving link, each at the joint value that it likes best.
-    fn first_apart(&self, local_from_root: &Pose, first: &FirstLink, tolerance: f32) -> Probe {
+    /// The probe of the first moving link, summed over the scans, each at the joint value that
+    /// scores best in it.
+    fn probe_first_by_scan(
+        &self,
+        local_from_root: &Pose,
+        first: &FirstLink,
+        tolerance: f32,
+    ) -> Probe {
         let poses = first.poses(local_from_root);
         let samples = Samples::first(self.model, first.link, self.settings.n_coarse / 2);
         let mut sum = Probe::default();
-        for evidence in &self.region.each {
+        for evidence in &self.region.by_scan {
             let probes = poses.iter().map(|p| samples.probe(evidence, p, tolerance));
             let best = probes.max_by(|a, b| a.score.total_cmp(&b.score));
             best.iter().for_each(|b| sum.join(b));
@@ -202,8 +229,8 @@ impl BaseSearch<'_> {
     }
 }
 
-/// What the pose says that scores most.
+/// The highest score; of equals the first.
 fn highest(all: impl Iterator<Item = SampleScore>) -> SampleScore {
     let nothing = SampleScore { score: f64::NEG_INFINITY, seen: 0.0 };
-    all.fold(nothing, |best, said| if said.score > best.score { said } else { best })
+    all.fold(nothing, |best, rating| if rating.score > best.score { rating } else { best })
 }

@@ -1,5 +1,5 @@
-//! Base poses of a level of the search and the next, finer grid in; poses about the best places
-//! that they lead to, with base and first link, out.
+//! Refines base poses from one level of the search to the next, finer grid: a hill climb from each
+//! pose with base and first link together, then scores of the poses around the best one.
 
 use contract::Fan;
 use geometry::{Plane, Pose};
@@ -7,19 +7,19 @@ use std::collections::HashMap;
 
 use crate::problem::BaseSearch;
 use crate::regions::are_stacked;
-use crate::trial::{BaseTrial, LAG, SampleScore, Samples, Thinning, best};
+use crate::trial::{BaseTrial, MAX_LAG, SampleScore, Samples, Thinning, best};
 
-/// Steps that a pose may go beyond its neighbours while it gets better.
+/// Limit of the steps of a climb beyond the first neighbours.
 const CLIMB: usize = 3;
 
-/// Where a climb starts.
+/// The start of a climb.
 struct ClimbStart<'a> {
     trial: &'a BaseTrial,
-    /// Likely poses of the first link, frame of the root; none where it is not asked.
+    /// Likely poses of the first link in the root's frame; empty if the first link is not scored.
     root_from_firsts: &'a [Pose],
 }
 
-/// Steps from a pose that is refined: planes up, along x and y, yaw.
+/// Steps from the start of a climb: planes upwards, x, y, yaw.
 type ClimbSteps = [isize; 4];
 
 /// A level of the search: the spacing of its grid, and how many of its poses are kept.
@@ -28,25 +28,25 @@ pub(crate) struct SearchLevel {
     pub(crate) step: f64,
     /// Step of the yaw, radians.
     pub(crate) yaw: f64,
-    /// Planes from one height to the next, where heights are guessed.
+    /// Step between guessed planes.
     pub(crate) rise: isize,
-    /// Base poses that go on to the next level.
+    /// Limit of base poses that are kept for the next level.
     pub(crate) keep: usize,
-    /// Most of them at one place.
+    /// Limit of these at one place.
     pub(crate) quota: usize,
 }
 
 impl SearchLevel {
-    /// How far from a surface a point may be that counts, metres.
+    /// Largest distance of a point from the surface that it counts for, metres.
     fn tolerance(&self) -> f32 {
         (self.step * 1.5).clamp(0.025, 0.08) as f32
     }
 }
 
 impl BaseSearch<'_> {
-    /// Goes from each trial to where it gets better and tries what is about that, on a finer grid,
-    /// with base and first link.
-    pub(crate) fn finer(
+    /// Climbs from each trial to a local maximum, and scores the trials around it with base and
+    /// first link on the level's grid.
+    pub(crate) fn refine_level(
         &self,
         planes: &[Plane],
         trials: &[BaseTrial],
@@ -61,33 +61,33 @@ impl BaseSearch<'_> {
             yaw_step: level.yaw * 0.6,
         };
         let around = |trial: BaseTrial| -> Vec<BaseTrial> {
-            let firsts = self.likely_firsts(&planes[trial.plane], &trial, tolerance);
+            let firsts = self.likely_first_links(&planes[trial.plane], &trial, tolerance);
             let mut near =
                 self.climb(planes, &ClimbStart { trial: &trial, root_from_firsts: &firsts }, level);
             for t in &mut near {
-                t.said =
-                    self.joined(self.look(planes, t, self.settings.n_fine, tolerance), t.first);
+                t.rating =
+                    self.combined(self.look(planes, t, self.settings.n_fine, tolerance), t.first);
             }
             near
         };
         let mut out: Vec<BaseTrial> =
             fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
         best(&mut out, Thinning { keep: 2 * kept.keep, quota: 2 * kept.quota, ..kept });
-        let mut out = fan.fan(out, |t| self.with_first(&planes[t.plane], t, tolerance));
+        let mut out = fan.fan(out, |t| self.with_first_link(&planes[t.plane], t, tolerance));
         best(&mut out, kept);
         out
     }
 
-    /// The neighbours of the best pose that steps to ever better ones lead to, those that may be as
-    /// good: the coarse level may have taken what stands beside a place for it. What hides a
-    /// foot may look like one: the first link, at its likely poses on the root, has a say.
+    /// Climbs to the best pose and returns its neighbours that may be as good. The coarse level may
+    /// have taken an object beside a base for the base. What hides a base may look like one, so
+    /// that the first link at its likely poses is scored as well.
     fn climb(
         &self,
         planes: &[Plane],
         start: &ClimbStart<'_>,
         level: &SearchLevel,
     ) -> Vec<BaseTrial> {
-        // Those about one pose are mostly about the next, too.
+        // Most neighbours of one pose are neighbours of the next, too.
         let mut known: HashMap<ClimbSteps, Option<BaseTrial>> = HashMap::new();
         let mut about = |middle: ClimbSteps| -> Vec<(ClimbSteps, BaseTrial)> {
             let heights = if self.is_guess { -1..2 } else { 0..1 };
@@ -106,18 +106,18 @@ impl BaseSearch<'_> {
             let Some((middle, so_far)) = best else { break };
             let farther = about(middle);
             let next = highest(&farther);
-            if next.is_none_or(|(_, trial)| trial.said.score <= so_far.said.score) {
+            if next.is_none_or(|(_, trial)| trial.rating.score <= so_far.rating.score) {
                 break;
             }
             (near, best) = (farther, next);
         }
-        // A few samples tell most neighbours to be worse.
-        let least = best.map_or(f64::INFINITY, |(_, trial)| trial.said.score - LAG);
-        near.into_iter().map(|(_, trial)| trial).filter(|t| t.said.score >= least).collect()
+        // Few samples suffice to exclude most neighbours.
+        let least = best.map_or(f64::INFINITY, |(_, trial)| trial.rating.score - MAX_LAG);
+        near.into_iter().map(|(_, trial)| trial).filter(|t| t.rating.score >= least).collect()
     }
 
-    /// A pose moved by some steps, with what a few samples of base and first link say; `None` where
-    /// there is no such plane.
+    /// The trial at some steps from the start, with a quick score of few samples of base and first
+    /// link; `None` if there is no such plane.
     fn moved_by(
         &self,
         planes: &[Plane],
@@ -138,16 +138,20 @@ impl BaseSearch<'_> {
             yaw: trial.yaw + k as f64 * level.yaw,
             ..*trial
         };
-        let own = self.look(planes, &next, self.settings.n_fine / 4, level.tolerance());
+        let of_base = self.look(planes, &next, self.settings.n_fine / 4, level.tolerance());
         if start.root_from_firsts.is_empty() {
-            return Some(BaseTrial { said: own, ..next });
+            return Some(BaseTrial { rating: of_base, ..next });
         }
-        let first =
-            self.glance_at(&planes[plane], &next, start.root_from_firsts, level.tolerance());
-        Some(BaseTrial { said: self.joined(own, first), first, ..next })
+        let first = self.quick_first_score(
+            &planes[plane],
+            &next,
+            start.root_from_firsts,
+            level.tolerance(),
+        );
+        Some(BaseTrial { rating: self.combined(of_base, first), first, ..next })
     }
 
-    /// What some samples of the base say at a glance.
+    /// Quick score of some samples of the base.
     fn look(
         &self,
         planes: &[Plane],
@@ -157,11 +161,11 @@ impl BaseSearch<'_> {
     ) -> SampleScore {
         let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
         let samples = Samples::first(self.model, self.base, n_samples);
-        self.region.glance(samples, &pose, tolerance)
+        self.region.quick_score(samples, &pose, tolerance)
     }
 }
 
-/// The trial that scores most, with where it is; of equals the last.
+/// The trial with the highest score and its steps; of equals the last.
 fn highest(near: &[(ClimbSteps, BaseTrial)]) -> Option<(ClimbSteps, BaseTrial)> {
-    near.iter().copied().max_by(|a, b| a.1.said.score.total_cmp(&b.1.said.score))
+    near.iter().copied().max_by(|a, b| a.1.rating.score.total_cmp(&b.1.rating.score))
 }

@@ -1,5 +1,9 @@
-//! Clusters, planes and a library of models in; candidates out: where each model's foot may stand,
-//! and how turned.
+//! Searches for the bases of robots: for each model of a library, the places and yaw angles at
+//! which its base may stand on the planes of a region.
+//!
+//! The search does not need clean clusters. It scores base poses by the free-space evidence of the
+//! scans' beams (METHOD.md §5–§7). Its results are [`contract::Candidate`]s, which are refined by
+//! the fit.
 //!
 //! The search needs no clean cluster: it asks the beams, on the planes that something may stand on
 //! (METHOD.md §5–§7).
@@ -20,5 +24,5 @@ mod trial;
 
 pub use problem::BaseSearch;
 pub use region_evidence::RegionEvidence;
-pub use regions::{RegionSettings, guessed_planes, raised_planes, regions, stand_planes};
-pub use settings::Settings;
+pub use regions::{guessed_planes, raised_planes, regions, stand_planes};
+pub use settings::{RegionSettings, Settings};

@@ -1,5 +1,5 @@
-//! One model and the evidence of one region in; what all steps of the search for the model's base
-//! read, out.
+//! The search problem: one model and the evidence of one region, as all steps of the search read
+//! them.
 
 use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -17,25 +17,26 @@ pub struct BaseSearch<'a> {
     pub(crate) index: usize,
     pub(crate) region: &'a RegionEvidence<'a>,
     pub(crate) settings: &'a Settings,
-    /// Farthest sample of the base from its upright axis, metres.
+    /// Largest distance of a sample of the base from its upright axis, metres.
     pub(crate) radius: f64,
-    /// Height of the base's lowest sample in the root's frame, metres.
+    /// Height of the lowest sample of the base in the root's frame, metres.
     foot: f64,
     /// The link that stands on the plane, and its pose in the root's frame.
     pub(crate) base: usize,
     pub(crate) root_from_base: Pose,
     /// The first link that moves and has a surface.
     pub(crate) first: Option<FirstLink>,
-    /// Whether the planes are guesses, one close above the other.
+    /// Whether the planes are guessed heights, stacked closely.
     pub(crate) is_guess: bool,
-    /// Lowest mean score of base and first link that counts.
+    /// Least mean score of base and first link for a candidate.
     pub(crate) min_score: f64,
-    /// So many times the usual number of base poses are kept at each level.
+    /// Factor on the number of base poses that are kept at each level.
     pub(crate) breadth: usize,
 }
 
 impl<'a> BaseSearch<'a> {
-    /// Prepares the search; `None` for a model without a base surface, or one that is only a tool.
+    /// Prepares the search for model `index` of the library. `None` if the model has no base
+    /// surface or is a tool.
     #[must_use]
     pub fn new(
         index: usize,
@@ -76,26 +77,27 @@ impl<'a> BaseSearch<'a> {
         })
     }
 
-    /// The same on planes that are guesses, one close above the other: a few of them tell where to
-    /// look at the others.
+    /// The same search on guessed planes, stacked closely: only some of them are searched at the
+    /// coarse level.
     #[must_use]
-    pub fn on_guesses(self) -> Self {
+    pub fn on_guessed_planes(self) -> Self {
         Self { is_guess: true, ..self }
     }
 
-    /// The same with so many times the base poses at each level.
+    /// The same search with `breadth` times as many base poses at each level.
     #[must_use]
-    pub fn broad(self, breadth: usize) -> Self {
+    pub fn with_breadth(self, breadth: usize) -> Self {
         Self { breadth, ..self }
     }
 
-    /// The same for bases that score so much at least.
+    /// The same search for candidates with at least this score, or the least score of the settings
+    /// if that is higher.
     #[must_use]
-    pub fn at_least(self, score: f64) -> Self {
+    pub fn with_min_score(self, score: f64) -> Self {
         Self { min_score: self.min_score.max(score), ..self }
     }
 
-    /// What the first samples of the base say where it stands as in a trial, `tolerance` in metres.
+    /// The score of the first samples of the base at a trial's pose; `tolerance` in metres.
     pub(crate) fn score_base(
         &self,
         plane: &Plane,
@@ -105,11 +107,12 @@ impl<'a> BaseSearch<'a> {
     ) -> SampleScore {
         let samples = Samples::first(self.model, self.base, n_samples);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
-        self.region.said(&samples.probe(self.region.evidence, &pose, tolerance))
+        self.region.rating(&samples.probe(self.region.evidence, &pose, tolerance))
     }
 
-    /// The base standing on the plane at a place (its own coordinates), turned by `yaw` about the
-    /// plane's normal.
+    /// The pose of the root link in the region's frame, for a base that stands on the plane at (x,
+    /// y) of the plane's own coordinates (metres), turned by `yaw` (radians) about the plane's
+    /// normal.
     pub(crate) fn pose(&self, plane: &Plane, x: f64, y: f64, yaw: f64) -> Pose {
         let frame = plane.frame();
         let foot = frame * Vector::new(x, y, plane.offset - self.foot);

@@ -1,64 +1,24 @@
-//! Clusters in; out come the regions of the world that are worth a search: groups of clusters that
-//! may be parts of one thing, not too small to be a robot.
+//! Groups clusters to regions that are worth a search: clusters that may be parts of one object and
+//! are large enough for a robot. Also makes guessed planes for bases where no plane was found.
 
 use contract::{Cluster, InstallationPlane, Region};
 use geometry::{Aabb, Plane, Point, Vector};
+use std::ops::Range;
 
-use crate::body_boxes::bodies;
+use crate::body_boxes::body_boxes;
+use crate::settings::RegionSettings;
 
-/// What is tuned.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RegionSettings {
-    /// Clusters whose boxes come this near (metres) are one region: a thin arm may be cut from its
-    /// body by shadow.
-    pub join_gap: f64,
-    /// How far a region reaches beyond its clusters, metres.
-    pub margin: f64,
-    /// Smallest height of a region, metres: no robot folds lower.
-    pub min_height: f64,
-    /// Smallest larger edge of a region, metres.
-    pub min_extent: f64,
-    /// Fewest points of a region.
-    pub min_points: u64,
-    /// A cluster smaller than this (metres, larger edge) joins a region but does not found one.
-    pub min_seed: f64,
-    /// Largest edge of a region on the ground, metres; larger ones are cut into overlapping
-    /// squares.
-    pub max_extent: f64,
-    /// How far such squares overlap, metres: the reach of a large robot.
-    pub overlap: f64,
-    /// A cluster longer than this (metres) is structure, walls and fences and what touches them:
-    /// what is flat of it is left out, the rest taken apart.
-    pub max_body: f64,
-}
-
-impl Default for RegionSettings {
-    fn default() -> Self {
-        Self {
-            join_gap: 0.15,
-            margin: 0.4,
-            min_height: 0.25,
-            min_extent: 0.3,
-            min_points: 300,
-            min_seed: 0.2,
-            max_extent: 12.0,
-            overlap: 3.0,
-            max_body: 6.0,
-        }
-    }
-}
-
-/// The regions worth a search, by size of what founds them, largest first.
+/// The regions that are worth a search, sorted by descending number of points of their clusters.
 #[must_use]
 pub fn regions(clusters: &[Cluster], settings: &RegionSettings) -> Vec<Region> {
     let mut groups: Vec<(Aabb, u64)> = Vec::new();
-    for (bounds, n_points) in clusters.iter().flat_map(|c| bodies(c, settings)) {
+    for (bounds, n_points) in clusters.iter().flat_map(|c| body_boxes(c, settings)) {
         let size = bounds.size();
         if size.iter().fold(0.0_f64, |a, b| a.max(*b)) < settings.min_seed {
             continue;
         }
         let (mut bounds, mut n_points) = (bounds, n_points);
-        // Growing may bring the group near another one: repeat until nothing joins.
+        // A grown group may come near another one: repeat until none is near.
         while let Some(at) =
             groups.iter().position(|(b, _)| b.grown(settings.join_gap).touches(&bounds))
         {
@@ -78,39 +38,40 @@ pub fn regions(clusters: &[Cluster], settings: &RegionSettings) -> Vec<Region> {
     groups.iter().flat_map(|(b, _)| cut(b, settings)).map(|b| local(&b, settings.margin)).collect()
 }
 
-/// Distance between guessed heights, metres: the last tolerance of the base search forgives half of
+/// Distance between guessed planes, metres: the last tolerance of the base search covers half of
 /// it.
 pub(crate) const GUESS_STEP: f64 = 0.03;
-/// How far below what is seen a foot may stand, metres: a camera often cuts off the lower half of a
-/// base.
+/// How far below the lowest point of a region a base may stand, metres: a camera often cuts off the
+/// lower half of a base.
 const GUESS_BELOW: f64 = 0.5;
 
-/// Heights above the floor that a stand may have, metres: lower ones the fit takes up, higher ones
-/// are gantries.
+/// Range of the heights of stands above the floor, metres. The fit corrects smaller heights itself;
+/// gantries are higher.
 const STANDS: (f64, f64) = (0.12, 1.5);
 
-/// Most guessed heights: six metres.
+/// Limit of the guessed planes: six metres.
 const MAX_GUESSES: f64 = 200.0;
 
-/// Level planes at all heights of a box, where no plane is known to stand on. Their area is zero:
-/// no points carry them, so that a fit does not hold on to their height.
+/// Level planes at all heights of a box (world frame, metres), for regions without a known
+/// installation plane. Their area is zero, which means that no points support them and the fit does
+/// not keep their height.
 #[must_use]
 pub fn guessed_planes(world: &Aabb) -> Vec<InstallationPlane> {
-    level_planes(world, (world.min[2] - GUESS_BELOW, world.max[2] - 0.3))
+    level_planes(world, world.min[2] - GUESS_BELOW..world.max[2] - 0.3)
 }
 
-/// The same above a floor (height, metres) in a box: a foot may hide all of the stand's top under
-/// it.
+/// Level planes at the heights that a stand on a floor may have, within a box. `floor` is the
+/// height of the floor, metres. A base may hide the whole top of its stand.
 #[must_use]
 pub fn stand_planes(world: &Aabb, floor: f64) -> Vec<InstallationPlane> {
-    level_planes(world, (floor + STANDS.0, (floor + STANDS.1).min(world.max[2] - 0.3)))
+    level_planes(world, floor + STANDS.0..(floor + STANDS.1).min(world.max[2] - 0.3))
 }
 
-/// Thickest plate between a wall, a ceiling or a leaning plate and what is bolted to it, metres.
+/// Largest thickness of a plate between a mounting plane and the base bolted to it, metres.
 const THICKEST: f64 = 0.15;
 
-/// Planes before walls, ceilings and leaning plates, as plates and brackets lie on them whose rims
-/// are too narrow to be planes of their own. Their area is zero, too.
+/// Planes in front of walls, ceilings and tilted plates, for mounting plates and brackets whose
+/// rims are too narrow to be found as planes. Their area is zero.
 #[must_use]
 pub fn raised_planes(mounts: &[InstallationPlane]) -> Vec<InstallationPlane> {
     let n = (THICKEST / GUESS_STEP).round() as usize;
@@ -124,14 +85,16 @@ pub fn raised_planes(mounts: &[InstallationPlane]) -> Vec<InstallationPlane> {
     mounts.iter().flat_map(|mount| (1..=n).map(move |k| raised(mount, k))).collect()
 }
 
-/// Whether one guessed plane is so many guesses above another: those before several walls follow
-/// one another, too.
+/// Whether the plane `high` is `n` guesses above `low`. Guessed planes in front of several walls
+/// follow one another in the list, too.
 pub(crate) fn are_stacked(low: &Plane, high: &Plane, n: isize) -> bool {
     let off = high.offset - low.offset - n as f64 * GUESS_STEP;
     low.normal == high.normal && off.abs() < 0.1 * GUESS_STEP
 }
 
-fn level_planes(world: &Aabb, (low, high): (f64, f64)) -> Vec<InstallationPlane> {
+/// Level planes of a box at a range of heights (world frame, metres), every [`GUESS_STEP`].
+fn level_planes(world: &Aabb, heights: Range<f64>) -> Vec<InstallationPlane> {
+    let Range { start: low, end: high } = heights;
     let n = ((high - low) / GUESS_STEP).ceil().clamp(0.0, MAX_GUESSES) as usize;
     let level = |k: usize| {
         let z = low + k as f64 * GUESS_STEP;
@@ -143,7 +106,7 @@ fn level_planes(world: &Aabb, (low, high): (f64, f64)) -> Vec<InstallationPlane>
     (0..n).map(level).collect()
 }
 
-/// Squares of at most `max_extent` that overlap and cover the box.
+/// Cuts a box into overlapping boxes of at most `max_extent` on the ground.
 fn cut(bounds: &Aabb, settings: &RegionSettings) -> Vec<Aabb> {
     let spans = |i: usize| -> Vec<(f64, f64)> {
         let (low, high) = (bounds.min[i], bounds.max[i]);
@@ -169,7 +132,7 @@ fn cut(bounds: &Aabb, settings: &RegionSettings) -> Vec<Aabb> {
 fn local(bounds: &Aabb, margin: f64) -> Region {
     let grown = bounds.grown(margin);
     let c = grown.center();
-    // Whole centimetres keep the origin short to write and exact to add.
+    // An origin in whole centimetres is short to write and exact to add.
     let origin = Point::from([0, 1, 2].map(|i| (c[i] * 100.0).round() / 100.0));
     let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
     Region { origin, bounds: Aabb { min: shift(grown.min), max: shift(grown.max) } }

@@ -1,44 +1,45 @@
-//! A grid of scores and the samples of a body in; out comes the mean score of the samples at a
-//! pose, in whole numbers: one look-up and one addition a sample.
+//! A grid of scores, in which the mean score of a body's samples at a pose takes one look-up and
+//! one integer addition a sample.
 
 use crate::trial::SampleScore;
 use geometry::Pose;
 use geometry::depth::{Rows, rows, transform};
 
-/// Unit of the scores in a grid: the price of a hidden sample is two of them, that of one seen
-/// through a hundred.
+/// Unit of the scores in a grid. The price of a hidden sample is two units, that of a sample that a
+/// beam passed through is a hundred.
 pub(crate) const SCORE_UNIT: f32 = 0.015;
-/// Score of a cell that no beam could judge; no other scores just this.
+/// Score of a cell that no beam could judge. No other cell has this score.
 pub(crate) const UNJUDGED: i8 = -2;
-/// Price of a sample of a base that no beam could judge: from two sides, under an arm, nine in ten
-/// are hidden.
+/// Price of a sample of a base that no beam could judge. Scanned from two sides, under an arm, nine
+/// samples in ten are hidden.
 pub(crate) const HIDDEN: f32 = UNJUDGED as f32 * -SCORE_UNIT;
 
-/// What each cell of a region scores at some tolerance.
+/// The scores of the cells of a region at one tolerance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ScoreGrid<'a> {
-    /// Low corner of the first cell, local, metres.
+    /// Lowest corner of the first cell; region frame, metres.
     pub(crate) min: [f32; 3],
     /// Edge of a cell, metres.
     pub(crate) edge: f32,
-    /// Cells along x, y, z; x runs fastest.
+    /// Number of cells along x, y, z; x varies fastest.
     pub(crate) n: [i32; 3],
     /// Score of each cell, in [`SCORE_UNIT`]s.
     pub(crate) scores: &'a [i8],
 }
 
-/// Samples of a body in one attitude, as cells of the grid: the body is moved by whole cells.
+/// Samples of a body at one orientation, as cells of the grid, so that the body can be shifted by
+/// whole cells.
 #[derive(Debug, Clone)]
 pub(crate) struct Stencil<'a> {
     grid: ScoreGrid<'a>,
     places: Vec<i32>,
-    /// Least and most cells of the samples along x, y, z.
+    /// Lowest and highest cells of the samples along x, y, z.
     low: [i32; 3],
     high: [i32; 3],
 }
 
 impl<'a> ScoreGrid<'a> {
-    /// The rows that lead from the body's frame into cells.
+    /// The rows of the transformation from the body's frame to cells.
     fn cells_from(&self, local_from_body: &Pose) -> Rows {
         let mut m = rows(local_from_body);
         for (row, min) in m.iter_mut().zip(self.min) {
@@ -48,9 +49,9 @@ impl<'a> ScoreGrid<'a> {
         m
     }
 
-    /// What samples (frame of the body) say with the body at a pose; what lies outside of the grid
-    /// is hidden.
-    pub(crate) fn ask(&self, points: &[[f32; 3]], local_from_body: &Pose) -> SampleScore {
+    /// Score of samples (frame of the body, metres) with the body at a pose. Samples outside of the
+    /// grid are hidden.
+    pub(crate) fn look_up(&self, points: &[[f32; 3]], local_from_body: &Pose) -> SampleScore {
         let m = self.cells_from(local_from_body);
         let score = |p: &[f32; 3]| {
             let at = transform(&m, *p);
@@ -58,10 +59,10 @@ impl<'a> ScoreGrid<'a> {
             let place = || self.place(at.map(|v| v as i32)) as usize;
             if is_inside { self.scores[place()] } else { UNJUDGED }
         };
-        said(points.iter().map(score), points.len())
+        rating(points.iter().map(score), points.len())
     }
 
-    /// The samples of a body at a pose, which is where it is moved from.
+    /// The samples of a body at the pose that it is then shifted from.
     pub(crate) fn stencil(self, points: &[[f32; 3]], local_from_body: &Pose) -> Stencil<'a> {
         let m = self.cells_from(local_from_body);
         let cells: Vec<[i32; 3]> =
@@ -75,16 +76,16 @@ impl<'a> ScoreGrid<'a> {
         }
     }
 
-    /// Index of a cell, or the way to one that is so many cells away.
+    /// Index of a cell, or the difference of index to a cell this many cells away.
     fn place(&self, at: [i32; 3]) -> i32 {
         (at[2] * self.n[1] + at[1]) * self.n[0] + at[0]
     }
 }
 
 impl Stencil<'_> {
-    /// What the first `n` samples say with the body moved by `shift` (local, metres), to the
-    /// nearest cell; `None` where some of them would lie outside of the grid.
-    pub(crate) fn ask(&self, shift: [f32; 3], n: usize) -> Option<SampleScore> {
+    /// Score of the first `n` samples with the body shifted by `shift` (region frame, metres),
+    /// rounded to whole cells; `None` if a sample would lie outside of the grid.
+    pub(crate) fn look_up(&self, shift: [f32; 3], n: usize) -> Option<SampleScore> {
         let grid = &self.grid;
         let by = shift.map(|v| (v / grid.edge).round() as i32);
         let is_inside =
@@ -92,12 +93,12 @@ impl Stencil<'_> {
         is_inside.then(|| {
             let step = grid.place(by);
             let places = &self.places[..n.min(self.places.len())];
-            said(places.iter().map(|p| grid.scores[(p + step) as usize]), places.len())
+            rating(places.iter().map(|p| grid.scores[(p + step) as usize]), places.len())
         })
     }
 }
 
-fn said(scores: impl Iterator<Item = i8>, n: usize) -> SampleScore {
+fn rating(scores: impl Iterator<Item = i8>, n: usize) -> SampleScore {
     let add = |(sum, n_seen): (i32, i32), score: i8| {
         (sum + i32::from(score), n_seen + i32::from(score != UNJUDGED))
     };
@@ -120,11 +121,11 @@ mod tests {
         let stencil = grid.stencil(&points, &at(0.0, 0.0, 0.0));
         for (i, j, k) in [(0, 0, 0), (3, -1, 2), (7, 9, -1)] {
             let by = [i, j, k].map(|n| f64::from(n) * 0.03);
-            let moved = grid.ask(&points, &at(by[0], by[1], by[2]));
-            assert_eq!(stencil.ask(by.map(|v| v as f32), 3), Some(moved), "{by:?}");
+            let moved = grid.look_up(&points, &at(by[0], by[1], by[2]));
+            assert_eq!(stencil.look_up(by.map(|v| v as f32), 3), Some(moved), "{by:?}");
         }
-        assert_eq!(stencil.ask([1.0, 0.0, 0.0], 3), None);
-        let outside = grid.ask(&points, &at(9.0, 0.0, 0.0)).score;
+        assert_eq!(stencil.look_up([1.0, 0.0, 0.0], 3), None);
+        let outside = grid.look_up(&points, &at(9.0, 0.0, 0.0)).score;
         assert!((outside + f64::from(HIDDEN)).abs() < 1e-6, "{outside}");
     }
 }

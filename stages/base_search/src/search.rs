@@ -1,10 +1,9 @@
-//! One model and one region in; out come the base poses that the beams allow, grouped by place,
-//! best first.
+//! The search for the base poses of one model in one region, from coarse to fine: candidates
+//! grouped by place, best first.
 //!
-//! Pose space is (x, y, yaw) on each plane that lies under something; coarse to fine, each level
-//! keeping the best. From the second level on the first moving link is swept over its joint and
-//! counts too, because many a box looks like a foot, but few look like a foot with a carousel on
-//! it.
+//! The search space is (x, y, yaw) on each plane that has points above it; each level keeps the
+//! best poses. From the second level on the first moving link is scored as well, swept over its
+//! joint: many boxes have the shape of a base, but few that of a base with a carousel on it.
 
 use contract::{Candidate, Fan, InstallationPlane};
 use geometry::{Plane, Pose, Vector};
@@ -16,43 +15,43 @@ use crate::regions::{GUESS_STEP, are_stacked};
 use crate::score_grid::Stencil;
 use crate::trial::{BaseTrial, QUOTA, SampleScore, Samples, Thinning, best, coarse_yaw};
 
-/// Heights above a plane at which a foot is looked for, metres: not the plane itself, and no higher
-/// than shoulders stand.
+/// Heights above a plane of the points that may belong to a base, metres: above the plane itself,
+/// and not above a robot's shoulder.
 const FOOT_HEIGHTS: std::ops::Range<f64> = 0.03..1.2;
-/// Share of a base's radius within which there must be points about a place where it may stand.
-const ABOUT: f64 = 0.8;
-/// Least filled cells of the plane within that radius.
+/// Share of the base's radius within which a place needs points around it.
+const SURROUND_SHARE: f64 = 0.8;
+/// Fewest filled cells of the plane within that radius.
 const MIN_CELLS: usize = 3;
-/// Least points of a filled cell.
+/// Fewest points of a filled cell.
 const MIN_IN_CELL: u32 = 3;
-/// Mean score on a quarter of the samples, at the best of every other yaw, below which a place is
-/// not looked at any further.
-const HOPELESS: f64 = -0.2;
-/// Mean score by which a yaw may lag behind the best one of its place and still be looked at with
-/// all samples.
+/// Quick score (on a quarter of the samples, best of every other yaw) below which a place is
+/// dropped.
+const MIN_QUICK_SCORE: f64 = -0.2;
+/// Difference from the best quick score of a place up to which a yaw is scored with all samples.
 const YAW_LAG: f64 = 0.35;
-/// Of so many guessed heights one is looked at coarsely, at most: two up and down are tried then,
-/// and one more.
+/// Largest stride between guessed planes at the coarse level: the next levels try two planes up and
+/// down, and then one.
 const MAX_STRIDE: usize = 6;
-/// Tolerance of the coarse level in steps of its grid.
+/// Tolerance of the coarse level as a multiple of its grid's step.
 const COARSE_REACH: f64 = 1.3;
-/// Share of the lowest score that a base must have after the coarse level: on coarse grids the
-/// right one scores a little more or less than in the end.
+/// Share of the least score that a base must reach at the coarse level. On coarse grids the score
+/// of the right pose differs somewhat from the final one.
 const MIN_SHARE_COARSE: f64 = 0.4;
-/// Share of the lowest score that a base must have after the middle level.
+/// Share of the least score that a base must reach at the middle level.
 const MIN_SHARE_MIDDLE: f64 = 0.6;
-/// Ground that one robot and its furniture take, m².
+/// Area on the ground of one robot with its equipment, m².
 const CELL_AREA: f64 = 25.0;
-/// Most cells that a region is taken for: a square of 12 m holds so many.
+/// Largest number of robots that is expected in a region: a square of 12 m holds this many.
 const MAX_CELLS: usize = 6;
 
 impl BaseSearch<'_> {
-    /// The candidates: one for each place, best first.
+    /// Runs the search on installation planes (world frame) and returns the candidates, one for
+    /// each place, best first.
     #[must_use]
     pub fn run(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> Vec<Candidate> {
         let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
         let mut trials = Vec::new();
-        for at in self.looked_at_coarsely(&local) {
+        for at in self.coarse_planes(&local) {
             trials.extend(self.coarse(at, &planes[at], &local[at], fan));
         }
         let step = self.coarse_step();
@@ -65,12 +64,13 @@ impl BaseSearch<'_> {
             yaw_step: yaw_step * 0.9,
         };
         best(&mut trials, thinning);
-        // Half of a cell has the height of a foot: what stands on it tells sooner than a closer
-        // look.
+        // Large parts of a cell have the height of a base. The first link excludes them sooner than
+        // a finer grid does.
         let tolerance = self.coarse_tolerance();
-        let mut trials = fan.fan(trials, |t| self.glance_at_first(&local[t.plane], t, tolerance));
+        let mut trials =
+            fan.fan(trials, |t| self.quick_with_first_link(&local[t.plane], t, tolerance));
         best(&mut trials, Thinning { keep: self.settings.keep_coarse * cells, ..thinning });
-        self.drop_hopeless(&mut trials, MIN_SHARE_COARSE);
+        self.drop_low_scores(&mut trials, MIN_SHARE_COARSE);
         let middle = SearchLevel {
             step: step / 2.0,
             yaw: yaw_step / 2.0,
@@ -78,8 +78,8 @@ impl BaseSearch<'_> {
             keep: self.settings.keep_middle * cells,
             quota: QUOTA,
         };
-        let mut trials = self.finer(&local, &trials, &middle, fan);
-        self.drop_hopeless(&mut trials, MIN_SHARE_MIDDLE);
+        let mut trials = self.refine_level(&local, &trials, &middle, fan);
+        self.drop_low_scores(&mut trials, MIN_SHARE_MIDDLE);
         let per_place = self.settings.bases_per_place;
         let fine = SearchLevel {
             step: step / 4.0,
@@ -88,17 +88,17 @@ impl BaseSearch<'_> {
             keep: self.settings.max_places * cells * per_place,
             quota: per_place,
         };
-        let trials = self.finer(&local, &trials, &fine, fan);
+        let trials = self.refine_level(&local, &trials, &fine, fan);
         self.group(planes, &local, &trials)
     }
 
-    /// Drops trials that score less than a share of what they need in the end.
-    fn drop_hopeless(&self, trials: &mut Vec<BaseTrial>, share: f64) {
-        trials.retain(|t| t.said.score >= share * self.min_score);
+    /// Drops trials that score less than a share of the least score.
+    fn drop_low_scores(&self, trials: &mut Vec<BaseTrial>, share: f64) {
+        trials.retain(|t| t.rating.score >= share * self.min_score);
     }
 
-    /// How many robot cells the region may hold, at least one: the more, the more places must go
-    /// on.
+    /// Number of robots that the region may hold, at least one. It scales the number of places that
+    /// are kept.
     fn n_cells(&self) -> usize {
         let size = self.region.region.bounds.size();
         ((size[0] * size[1] / CELL_AREA).round() as usize).clamp(1, MAX_CELLS)
@@ -111,33 +111,33 @@ impl BaseSearch<'_> {
         }
     }
 
-    /// Spacing of the coarse grid: small enough that the true place lies within the tolerance.
+    /// Step of the coarse grid, metres: small enough that the true place lies within the tolerance.
     fn coarse_step(&self) -> f64 {
-        self.region.in_cells((self.radius * 0.35).clamp(0.04, 0.10))
+        self.region.whole_cells((self.radius * 0.35).clamp(0.04, 0.10))
     }
 
     /// Tolerance of the coarse level, metres.
     fn coarse_tolerance(&self) -> f32 {
-        self.region.of_grid((COARSE_REACH * self.coarse_step()) as f32)
+        self.region.grid_tolerance((COARSE_REACH * self.coarse_step()) as f32)
     }
 
-    /// Which planes are looked at coarsely: the lowest of a stack of guessed heights and every few
-    /// above it; else all.
-    fn looked_at_coarsely(&self, planes: &[Plane]) -> Vec<usize> {
+    /// The planes that are searched at the coarse level: of a stack of guessed planes the lowest
+    /// and every few above it, otherwise all.
+    fn coarse_planes(&self, planes: &[Plane]) -> Vec<usize> {
         let reach = COARSE_REACH * self.coarse_step();
         let stride = ((1.5 * reach / GUESS_STEP) as usize).clamp(1, MAX_STRIDE);
         let mut first = 0;
-        let is_looked_at = |at: &usize| {
+        let is_searched = |at: &usize| {
             let is_above = *at > first && are_stacked(&planes[*at - 1], &planes[*at], 1);
             if !is_above {
                 first = *at;
             }
             !self.is_guess || (*at - first).is_multiple_of(stride)
         };
-        (0..planes.len()).filter(is_looked_at).collect()
+        (0..planes.len()).filter(is_searched).collect()
     }
 
-    /// Every place on the plane that has points about it, every yaw.
+    /// Scores every place on the plane that has points around it, at every yaw.
     fn coarse(
         &self,
         at: usize,
@@ -158,40 +158,39 @@ impl BaseSearch<'_> {
         let frame = local.frame();
         let place = |(x, y): (f64, f64)| -> Vec<BaseTrial> {
             let shift = frame * Vector::new(x - start.0, y - start.1, 0.0);
-            let ask = |k: usize, n_samples: usize| {
+            let look_up = |k: usize, n_samples: usize| {
                 let known = stencils.as_ref().map(|s| &s[k]);
-                let known = known.and_then(|s| s.ask(shift.cast::<f32>().into(), n_samples));
+                let known = known.and_then(|s| s.look_up(shift.cast::<f32>().into(), n_samples));
                 known.unwrap_or_else(|| {
                     let mut pose = turned(k);
                     pose.translation.vector += shift;
                     let samples = Samples::first(self.model, self.base, n_samples);
-                    self.region.glance(samples, &pose, tolerance)
+                    self.region.quick_score(samples, &pose, tolerance)
                 })
             };
-            // A few samples at every other yaw tell most places to be hopeless, and most yaws of
-            // the others.
+            // Few samples at every other yaw exclude most places, and most yaws of the others.
             let few: Vec<f64> =
-                (0..n).step_by(2).map(|k| ask(k, self.settings.n_coarse / 4).score).collect();
+                (0..n).step_by(2).map(|k| look_up(k, self.settings.n_coarse / 4).score).collect();
             let top = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
-            if top < HOPELESS {
+            if top < MIN_QUICK_SCORE {
                 return Vec::new();
             }
             let is_open = |k: usize| {
                 few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()]) >= top - YAW_LAG
             };
             let all = (0..n).filter(|k| is_open(*k)).filter_map(|k| {
-                let said = ask(k, self.settings.n_coarse);
+                let rating = look_up(k, self.settings.n_coarse);
                 let yaw = k as f64 * coarse_yaw();
                 let first = SampleScore::default();
-                (said.score > 0.0).then_some(BaseTrial { x, y, yaw, plane: at, said, first })
+                (rating.score > 0.0).then_some(BaseTrial { x, y, yaw, plane: at, rating, first })
             });
             all.collect()
         };
         fan.fan(places, place).into_iter().flatten().collect()
     }
 
-    /// Places on the plane, in its own coordinates, with points above it within the base's radius,
-    /// in rows.
+    /// Places on the plane (x, y in its own coordinates, metres) that have points above it within
+    /// the base's radius, row by row.
     fn occupied(&self, plane: &InstallationPlane, local: &Plane, step: f64) -> Vec<(f64, f64)> {
         let to_plane = local.frame().inverse();
         let span = |corners: [[f64; 3]; 8], i: usize| {
@@ -216,8 +215,8 @@ impl BaseSearch<'_> {
         let n: [usize; 2] =
             std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
         let mut count = vec![0_u32; n[0] * n[1]];
-        for spot in self.region.spots() {
-            let q = to_plane * Vector::from(spot.at.map(f64::from));
+        for cube in self.region.point_cubes() {
+            let q = to_plane * Vector::from(cube.at.map(f64::from));
             let height = q.z - local.offset;
             if !FOOT_HEIGHTS.contains(&height) {
                 continue;
@@ -225,11 +224,11 @@ impl BaseSearch<'_> {
             let i = ((q.x - low[0]) / step).round();
             let j = ((q.y - low[1]) / step).round();
             if i >= 0.0 && j >= 0.0 && (i as usize) < n[0] && (j as usize) < n[1] {
-                count[j as usize * n[0] + i as usize] += spot.n_points;
+                count[j as usize * n[0] + i as usize] += cube.n_points;
             }
         }
-        // A base's middle is empty: what counts is points about it.
-        let r = ((self.radius * ABOUT) / step).ceil() as isize;
+        // The scans show no points in the middle of a base, so that points around it are counted.
+        let r = ((self.radius * SURROUND_SHARE) / step).ceil() as isize;
         let mut out = Vec::new();
         for j in 0..n[1] as isize {
             for i in 0..n[0] as isize {
@@ -260,7 +259,7 @@ impl BaseSearch<'_> {
         trials: &[BaseTrial],
     ) -> Vec<Candidate> {
         let mut places: Vec<Vec<BaseTrial>> = Vec::new();
-        for trial in trials.iter().filter(|t| t.said.score >= self.min_score) {
+        for trial in trials.iter().filter(|t| t.rating.score >= self.min_score) {
             let radius = self.settings.place_radius;
             let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
             let here = at(trial);
@@ -276,7 +275,7 @@ impl BaseSearch<'_> {
                 None => {}
             }
         }
-        places.iter_mut().for_each(|p| p.sort_by(|a, b| b.said.score.total_cmp(&a.said.score)));
+        places.iter_mut().for_each(|p| p.sort_by(|a, b| b.rating.score.total_cmp(&a.rating.score)));
         places.retain_mut(|place| self.accept(local, place));
         let world_from_local = Pose::from_parts(
             Translation3::from(self.region.region.origin.coords),
@@ -293,7 +292,7 @@ impl BaseSearch<'_> {
                     .iter()
                     .map(|t| {
                         let pose = self.pose(&local[t.plane], t.x, t.y, t.yaw);
-                        (world_from_local * pose, t.said.score)
+                        (world_from_local * pose, t.rating.score)
                     })
                     .collect(),
             })

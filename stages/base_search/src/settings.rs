@@ -1,25 +1,25 @@
-//! What is tuned about the search for bases: samples, base poses that are kept, and scores.
+//! The settings of this crate: samples, numbers of base poses, scores, and the sizes of regions.
 
-/// What is tuned.
+/// The settings of the search for bases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Samples of the base link at the coarse level.
+    /// Number of samples of the base link at the coarse level.
     pub n_coarse: usize,
-    /// Samples of a link at finer levels.
+    /// Number of samples of a link at finer levels.
     pub n_fine: usize,
-    /// Base poses of the coarse level whose first link is looked at.
+    /// Number of base poses of the coarse level whose first moving link is scored.
     pub keep_feet: usize,
-    /// Base poses that survive the coarse level.
+    /// Number of base poses that are kept after the coarse level.
     pub keep_coarse: usize,
-    /// Base poses that survive the middle level.
+    /// Number of base poses that are kept after the middle level.
     pub keep_middle: usize,
-    /// Places (bases farther apart than `place_radius`) that go on to the fit.
+    /// Number of places (bases at least `place_radius` apart) that are fitted.
     pub max_places: usize,
-    /// Base poses that go on to the fit for each place.
+    /// Number of base poses that are fitted for each place.
     pub bases_per_place: usize,
-    /// Bases nearer than this are at the same place, metres.
+    /// Bases nearer to each other than this are at the same place, metres.
     pub place_radius: f64,
-    /// Lowest mean sample score of base and first link that is worth a fit.
+    /// Least mean score of the samples of base and first moving link for a fit.
     pub min_score: f64,
 }
 
@@ -35,6 +35,49 @@ impl Default for Settings {
             bases_per_place: 12,
             place_radius: 0.30,
             min_score: 0.05,
+        }
+    }
+}
+
+/// The settings of the regions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionSettings {
+    /// Largest distance between the boxes of clusters of one region, metres: a shadow may cut a
+    /// thin arm from its body.
+    pub join_gap: f64,
+    /// Margin of a region around its clusters, metres.
+    pub margin: f64,
+    /// Least height of a region, metres: no robot is lower when folded.
+    pub min_height: f64,
+    /// Least length of the longest edge of a region, metres.
+    pub min_extent: f64,
+    /// Fewest points of a region.
+    pub min_points: u64,
+    /// Least length of the longest edge of a cluster that counts, metres.
+    pub min_seed: f64,
+    /// Largest edge of a region on the ground, metres. A larger region is cut into overlapping
+    /// squares.
+    pub max_extent: f64,
+    /// Overlap of these squares, metres: the reach of a large robot.
+    pub overlap: f64,
+    /// Largest edge on the ground of a cluster that is one body, metres. A larger cluster is a
+    /// structure (walls, fences and what touches them): its flat parts are left out, and the rest
+    /// is split into bodies.
+    pub max_body: f64,
+}
+
+impl Default for RegionSettings {
+    fn default() -> Self {
+        Self {
+            join_gap: 0.15,
+            margin: 0.4,
+            min_height: 0.25,
+            min_extent: 0.3,
+            min_points: 300,
+            min_seed: 0.2,
+            max_extent: 12.0,
+            overlap: 3.0,
+            max_body: 6.0,
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Base poses under test in; the best of them, few of each place, out; and the parts of a model
-//! that they are tested by.
+//! Trials, which are base poses under test, their scores, and how they are thinned out. Also the
+//! parts of a model that trials are scored by.
 
 use geometry::probe::HIDDEN_PRICE;
 use geometry::{Evidence, Pose, Probe};
@@ -7,16 +7,16 @@ use robot::Model;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// Most base poses that are kept of one place: a cabinet that looks like a foot whatever its yaw
-/// leaves room for others, which fewer scans see.
+/// Limit of base poses of one place. A cabinet that scores at any yaw must leave room for other
+/// places that fewer scans see.
 pub(crate) const QUOTA: usize = 16;
-/// Radius of such a place, metres: the same at all levels, else a place would be many at the
-/// finest.
+/// Radius of such a place, metres. It is the same at all levels, since a place would split into
+/// many at the finest.
 const PLACE: f64 = 0.2;
 
-/// Mean score on a quarter of the samples by which a pose may lag behind the best and still be
-/// looked at closely.
-pub(crate) const LAG: f64 = 0.15;
+/// Difference from the best quick score (on a quarter of the samples) up to which a pose is scored
+/// with all samples.
+pub(crate) const MAX_LAG: f64 = 0.15;
 
 /// A base pose under test.
 #[derive(Debug, Clone, Copy)]
@@ -25,41 +25,42 @@ pub(crate) struct BaseTrial {
     pub(crate) y: f64,
     pub(crate) yaw: f64,
     pub(crate) plane: usize,
-    /// Of the base, joined with that of the first moving link once it was looked at.
-    pub(crate) said: SampleScore,
-    /// Of the first moving link alone, at the place that this one was refined from; nothing
+    /// Score of the base, combined with that of the first moving link once that is known.
+    pub(crate) rating: SampleScore,
+    /// Score of the first moving link alone, at the trial that this one was refined from; zero
     /// before.
     pub(crate) first: SampleScore,
 }
 
-/// What samples of a body at a pose say.
+/// The score of the samples of a body at a pose.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct SampleScore {
-    /// Mean score of all, those that no beam could judge at their price.
+    /// Mean score of all samples, with the price of a hidden sample for those that no beam could
+    /// judge.
     pub(crate) score: f64,
-    /// Share of them that beams could judge.
+    /// Share of the samples that beams could judge, 0 to 1.
     pub(crate) seen: f64,
 }
 
 impl SampleScore {
-    /// Of a probe whose mean score is known.
+    /// The score of a probe whose mean score is known.
     pub(crate) fn of(probe: &Probe, score: f64) -> Self {
         Self { score, seen: f64::from(probe.seen()) }
     }
 
-    /// By which poses are told better from worse until few are left: between the mean score of all
-    /// samples, by which what all scans see of a cabinet outdoes what one of them sees of a
-    /// robot, and that of the judged, by which a corner of anything does.
+    /// The value that trials are sorted by. It lies between the mean score of all samples, which
+    /// favours a cabinet that all scans see over a robot that one scan sees, and the mean score of
+    /// the judged samples, which favours a corner of anything.
     pub(crate) fn rank(&self) -> f64 {
         self.score / self.seen.max(LEAST_SEEN).sqrt()
     }
 }
 
-/// Share of samples below which ever fewer count for ever less.
+/// Share of judged samples below which the rank falls with the share.
 const LEAST_SEEN: f64 = 0.1;
 
 /// Mean score of the samples that could be judged.
-pub(crate) fn of_judged(probe: &Probe) -> f64 {
+pub(crate) fn judged_score(probe: &Probe) -> f64 {
     let back = HIDDEN_PRICE * (probe.n - probe.n_seen) as f32;
     f64::from((probe.score + back) / probe.n_seen.max(1) as f32)
 }
@@ -68,7 +69,7 @@ pub(crate) fn coarse_yaw() -> f64 {
     TAU / 24.0
 }
 
-/// The first link in tree order that has a surface and hangs rigidly on the root.
+/// The first link in tree order that has a surface and is rigidly connected to the root.
 pub(crate) fn base_link(model: &Model) -> Option<usize> {
     (0..model.links.len()).find(|&l| {
         let mut at = l;
@@ -81,7 +82,7 @@ pub(crate) fn base_link(model: &Model) -> Option<usize> {
     })
 }
 
-/// The first free joint and the first link with a surface that it carries directly.
+/// The first free joint and the link that it moves directly, if that link has a surface.
 pub(crate) fn first_moving(model: &Model) -> Option<(usize, usize)> {
     let joint = *model.free.first()?;
     let child = model.joints[joint].child;
@@ -105,7 +106,7 @@ impl<'a> Samples<'a> {
         Self { points: &cad.points[..n], normals: &cad.normals[..n] }
     }
 
-    /// What beams and points say of the samples of a body at a pose, `tolerance` in metres.
+    /// Probes the samples against beams and points, with the body at a pose; `tolerance` in metres.
     pub(crate) fn probe(
         &self,
         evidence: &Evidence<'_>,
@@ -116,33 +117,33 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// How many trials are kept, and how much they differ.
+/// Limits of the trials that are kept, and the differences between them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Thinning {
-    /// Most trials in all.
+    /// Limit of all trials.
     pub(crate) keep: usize,
-    /// Most trials of one place.
+    /// Limit of the trials of one place.
     pub(crate) quota: usize,
-    /// Trials nearer to a better one than this are left out, metres …
+    /// A trial is dropped if it is nearer to a better one than this in both coordinates, metres …
     pub(crate) step: f64,
-    /// … if they are turned from it by less than this, radians.
+    /// … and its yaw differs from that one by less than this, radians.
     pub(crate) yaw_step: f64,
 }
 
-/// Sorts best first and keeps those that differ from every better one by a step in place or yaw.
+/// Sorts the trials by descending rank and keeps those that differ from every better one.
 pub(crate) fn best(trials: &mut Vec<BaseTrial>, thinning: Thinning) {
     let Thinning { keep, quota, step, yaw_step } = thinning;
     trials.sort_by(|a, b| {
-        b.said
+        b.rating
             .rank()
-            .total_cmp(&a.said.rank())
+            .total_cmp(&a.rating.rank())
             .then(a.plane.cmp(&b.plane))
             .then(a.x.total_cmp(&b.x))
             .then(a.y.total_cmp(&b.y))
             .then(a.yaw.total_cmp(&b.yaw))
     });
     let mut kept: Vec<BaseTrial> = Vec::new();
-    // What is near enough to matter lies in the same cell or beside it.
+    // Trials within the radius of a place lie in the same cell or a neighbouring one.
     let edge = PLACE.max(step);
     let cell = |t: &BaseTrial| [t.x, t.y].map(|v| (v / edge).floor() as i32);
     let mut cells: HashMap<(usize, [i32; 2]), Vec<usize>> = HashMap::new();

@@ -1,5 +1,8 @@
-//! Points of two sessions that stand still, with what each session's beams say of the other's
-//! places, in; things that appeared, went or moved, and regions that could not be compared, out.
+//! Compares two sessions of a plant: things that appeared, went or moved between them, and regions
+//! that could not be compared.
+//!
+//! The input is the points of each session that do not belong to robots, each with what the beams
+//! of the other session show about its place.
 #![forbid(unsafe_code)]
 
 mod occupancy;
@@ -10,4 +13,4 @@ mod unobserved;
 
 pub use occupancy::{OccupancyBuilder, SessionEvidence, SessionOccupancy};
 pub use things::{Thing, ThingChange, ThingSettings, things};
-pub use unobserved::{Unseen, unseen};
+pub use unobserved::{UnobservedRegion, unobserved_regions};

@@ -1,62 +1,63 @@
-//! Points of one session that stand still, with what the other session's beams say of their places,
-//! in; out come voxels: in which of them something stands, which of them changed, and how much of
-//! them is covered.
+//! Counts the points of one session by voxel, with what the other session's beams show about their
+//! places: which voxels are solid, which changed, and how much of their faces the points cover.
 
 use geometry::Aabb;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
-/// A voxel of a world: `floor(p / edge)`.
+/// Index of a voxel in the world frame: `floor(p / edge)`.
 pub(crate) type OccupancyCell = [i32; 3];
 
 /// Edge of a voxel, metres.
 pub(crate) const EDGE: f64 = 0.05;
-/// Voxels in a metre: a product is cheaper than a quotient.
+/// Voxels per metre: a multiplication is cheaper than a division.
 const PER_METRE: f64 = 1.0 / EDGE;
-/// Voxels so many steps apart are of one thing.
+/// Voxels at most this many steps apart belong to one thing.
 pub(crate) const REACH: i32 = 2;
 /// Fewest points that make a voxel solid.
 pub(crate) const MIN_POINTS: u32 = 3;
-/// Share of a voxel's points whose places the other session must have seen empty, or not at all.
+/// Least share of a voxel's points whose places the other session must have seen empty (or not at
+/// all) for the voxel to count as changed (or as unobserved).
 const MIN_SHARE: f64 = 0.6;
 
-/// Points of one session by voxel: how many, and at how many places of theirs the other session saw
-/// nothing. Nothing depends on the order of the voxels.
+/// The points of one session by voxel, with what the other session shows about their places. No
+/// result depends on the order of the voxels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SessionOccupancy {
     cells: FxHashMap<OccupancyCell, CellCount>,
-    /// Voxels with points of robots and what hangs on them.
+    /// Voxels with points of robots or of what is attached to them.
     robots: BTreeSet<OccupancyCell>,
 }
 
-/// What another session says of a point's place.
+/// What the beams of another session show about the place of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SessionEvidence {
-    /// None of its beams got there.
-    Not,
-    /// Some ended there, or so close that it may be the same.
-    Something,
-    /// They went on beyond it.
-    Nothing {
-        /// As did another beam of the point's own session: it is of a wire or an edge.
+    /// No beam reached the place.
+    Unobserved,
+    /// A beam ended at the place, or so close that it may have hit the same surface.
+    Occupied,
+    /// The beams ended beyond the place: it is empty.
+    Empty {
+        /// Whether another beam of the point's own session passed the place as well, as at a wire
+        /// or an edge.
         is_pierced: bool,
     },
 }
 
-/// What is in a voxel.
+/// The counts of one voxel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct CellCount {
     n_points: u32,
-    /// At whose places the other session saw nothing …
+    /// Points whose places the other session saw empty.
     n_empty: u32,
-    /// … and another beam of their own session went on.
+    /// Points among these that another beam of their own session passed.
     n_pierced: u32,
-    /// To whose places no beam of the other session got.
+    /// Points whose places no beam of the other session reached.
     n_unseen: u32,
-    /// That the points stand for, across their beams, m².
+    /// Area across the beams that the points represent, m².
     area: f64,
-    /// Points, and the same, of the scan that has most of them there.
+    /// Number of points and their area (m²) of the scan that has most points in the voxel.
     most: (u32, f64),
 }
 
@@ -73,8 +74,8 @@ impl CellCount {
     }
 }
 
-/// Points of one scan that are still to be counted by voxel: neighbours in a scan mostly are in the
-/// same one, and cost no search for it.
+/// Counts the points of one scan by voxel. Consecutive points of a scan mostly lie in the same
+/// voxel, so that one run of them needs one look-up.
 #[derive(Debug, Default)]
 pub struct OccupancyBuilder {
     cells: FxHashMap<OccupancyCell, CellCount>,
@@ -83,16 +84,16 @@ pub struct OccupancyBuilder {
 }
 
 impl OccupancyBuilder {
-    /// Adds a point that stands still, and for so much area across its beam, m²; and what the other
-    /// session has at its place.
+    /// Adds a point that does not belong to a robot (world frame, metres), with the area across its
+    /// beam that it represents (m²) and what the other session shows about its place.
     #[inline]
     pub fn add(&mut self, world: [f64; 3], area: f64, seen: SessionEvidence) {
         let cell = SessionOccupancy::cell(world);
         let point = CellCount {
             n_points: 1,
-            n_empty: u32::from(matches!(seen, SessionEvidence::Nothing { .. })),
-            n_pierced: u32::from(seen == SessionEvidence::Nothing { is_pierced: true }),
-            n_unseen: u32::from(seen == SessionEvidence::Not),
+            n_empty: u32::from(matches!(seen, SessionEvidence::Empty { .. })),
+            n_pierced: u32::from(seen == SessionEvidence::Empty { is_pierced: true }),
+            n_unseen: u32::from(seen == SessionEvidence::Unobserved),
             area,
             most: (0, 0.0),
         };
@@ -111,7 +112,7 @@ impl OccupancyBuilder {
         }
     }
 
-    /// Adds a point of a robot or of what hangs on it.
+    /// Adds a point of a robot or of what is attached to it; world frame, metres.
     #[inline]
     pub fn add_robot(&mut self, world: [f64; 3]) {
         let cell = SessionOccupancy::cell(world);
@@ -120,7 +121,7 @@ impl OccupancyBuilder {
         }
     }
 
-    /// All of them by voxel.
+    /// Returns the counts of all added points.
     #[must_use]
     pub fn finish(mut self) -> SessionOccupancy {
         let last = self.last.take();
@@ -131,10 +132,10 @@ impl OccupancyBuilder {
 }
 
 impl SessionOccupancy {
-    /// Face of a voxel, m².
+    /// Area of one face of a voxel, m².
     pub const FACE: f64 = EDGE * EDGE;
 
-    /// The voxel of a place.
+    /// The voxel that contains a place; world frame, metres.
     #[inline]
     #[must_use]
     pub fn cell(world: [f64; 3]) -> OccupancyCell {
@@ -142,9 +143,9 @@ impl SessionOccupancy {
         [step(world[0]), step(world[1]), step(world[2])]
     }
 
-    /// Middles of voxels, world, metres.
+    /// Centres of voxels; world frame, metres.
     #[must_use]
-    pub fn middles(cells: &[OccupancyCell]) -> Vec<[f64; 3]> {
+    pub fn centres(cells: &[OccupancyCell]) -> Vec<[f64; 3]> {
         cells.iter().map(|c| c.map(|i| (f64::from(i) + 0.5) * EDGE)).collect()
     }
 
@@ -154,31 +155,31 @@ impl SessionOccupancy {
         self.cells.keys()
     }
 
-    /// Middles of the voxels in which something stands.
+    /// Centres of the solid voxels, sorted by voxel; world frame, metres.
     #[must_use]
     pub fn solid(&self) -> Vec<[f64; 3]> {
         let solid = self.cells.iter().filter(|(_, c)| c.n_points >= MIN_POINTS);
         let mut solid: Vec<OccupancyCell> = solid.map(|(cell, _)| *cell).collect();
         solid.sort_unstable();
-        Self::middles(&solid)
+        Self::centres(&solid)
     }
 
-    /// Adds all of another.
+    /// Adds the counts of another scan or session.
     pub fn join(&mut self, other: Self) {
         let all = other.cells.into_iter();
         all.for_each(|(cell, count)| self.cells.entry(cell).or_default().join(&count));
         self.robots.extend(other.robots);
     }
 
-    /// Whether a voxel within so many steps holds points of a robot.
+    /// Whether a voxel at most `reach` steps away holds points of a robot.
     pub(crate) fn has_robot_near(&self, cell: &OccupancyCell, reach: i32) -> bool {
         columns(cell, reach).any(|column| self.robots.range(column).next().is_some())
     }
 
-    /// Whether a voxel or one beside it holds points: what the other session has there, it has here
-    /// as well.
+    /// Whether a voxel or one of its 26 neighbours holds points. What the other session has in the
+    /// voxel is then not missing here.
     #[must_use]
-    pub fn has_some(&self, cell: &OccupancyCell) -> bool {
+    pub fn has_points_near(&self, cell: &OccupancyCell) -> bool {
         self.cells.contains_key(cell) || around(cell, 1).any(|cell| self.cells.contains_key(&cell))
     }
 
@@ -186,59 +187,64 @@ impl SessionOccupancy {
         self.cells.get(cell).is_some_and(|c| c.n_points >= MIN_POINTS)
     }
 
-    /// Points in some voxels.
+    /// Number of points in some voxels.
     pub(crate) fn n_points(&self, cells: &[OccupancyCell]) -> u64 {
         cells.iter().map(|c| u64::from(self.cells[c].n_points)).sum()
     }
 
-    /// Voxels that hold points, in and beside which the other session has nothing: of a wire or an
-    /// edge it has a point here and there.
+    /// Voxels whose points lie where the other session saw empty space, and which have no points of
+    /// the other session in or beside them. (Another session may have only single points of a wire
+    /// or an edge.)
     pub(crate) fn changed(&self, other: &Self) -> BTreeSet<OccupancyCell> {
-        self.alone(other, |c| c.n_empty)
+        self.without_counterpart(other, |c| c.n_empty)
     }
 
     /// Solid voxels that no beam of the other session reached.
     pub(crate) fn unseen(&self, other: &Self) -> BTreeSet<OccupancyCell> {
-        let mut out = self.alone(other, |c| c.n_unseen);
+        let mut out = self.without_counterpart(other, |c| c.n_unseen);
         out.retain(|cell| self.is_solid(cell));
         out
     }
 
-    /// Voxels of which so many points are enough, in and beside which the other session has none.
-    fn alone(&self, other: &Self, n: impl Fn(&CellCount) -> u32) -> BTreeSet<OccupancyCell> {
+    /// Voxels in which `n` of the points are at least the share [`MIN_SHARE`], and in and beside
+    /// which the other session has no points.
+    fn without_counterpart(
+        &self,
+        other: &Self,
+        n: impl Fn(&CellCount) -> u32,
+    ) -> BTreeSet<OccupancyCell> {
         let is_enough = |c: &CellCount| f64::from(n(c)) >= MIN_SHARE * f64::from(c.n_points);
         let full = self.cells.iter().filter(|(_, c)| is_enough(c));
-        full.map(|(cell, _)| *cell).filter(|cell| !other.has_some(cell)).collect()
+        full.map(|(cell, _)| *cell).filter(|cell| !other.has_points_near(cell)).collect()
     }
 
-    /// Share of the faces of some voxels that their points stand for.
+    /// Share of the faces of some voxels that their points cover.
     pub(crate) fn cover(&self, cells: &[OccupancyCell]) -> f64 {
         let area: f64 = cells.iter().map(|c| self.cells[c].area).sum();
         area / (cells.len() as f64 * Self::FACE)
     }
 
-    /// The same of the points of one scan, in each voxel of that which has most of them there.
+    /// Like [`Self::cover`], but of each voxel only the points of the scan with most points in it.
     pub(crate) fn cover_by_one(&self, cells: &[OccupancyCell]) -> f64 {
         let area: f64 = cells.iter().map(|c| self.cells[c].most.1).sum();
         area / (cells.len() as f64 * Self::FACE)
     }
 
-    /// Share of the points in some voxels at whose places another beam of their own session went
-    /// on.
+    /// Share of the points in some voxels that another beam of their own session passed.
     pub(crate) fn pierced(&self, cells: &[OccupancyCell]) -> f64 {
         let n: u64 = cells.iter().map(|c| u64::from(self.cells[c].n_pierced)).sum();
         n as f64 / self.n_points(cells) as f64
     }
 }
 
-/// All voxels within so many steps of one.
+/// All voxels at most `reach` steps away from one, itself included.
 pub(crate) fn around(cell: &OccupancyCell, reach: i32) -> impl Iterator<Item = OccupancyCell> {
     let ([x, y, z], r) = (*cell, reach);
     (-r..=r)
         .flat_map(move |i| (-r..=r).flat_map(move |j| (-r..=r).map(move |k| [x + i, y + j, z + k])))
 }
 
-/// The same as runs along the last axis, along which voxels are in order.
+/// The voxels of [`around`] as ranges along the last axis, in which voxels are sorted.
 fn columns(
     cell: &OccupancyCell,
     reach: i32,
@@ -248,8 +254,9 @@ fn columns(
     (-r..=r).flat_map(move |i| (-r..=r).map(move |j| column(i, j)))
 }
 
-/// All that is connected with a voxel by steps of at most `reach`; `take` says whether a voxel is
-/// new and belongs to it.
+/// The voxels that are connected with `first` by steps of at most `reach`, sorted. `take` returns
+/// whether a voxel belongs to the set and was not taken before. The search stops at `at_most`
+/// voxels or a few more.
 pub(crate) fn connected(
     first: OccupancyCell,
     reach: i32,
@@ -267,7 +274,7 @@ pub(crate) fn connected(
     out
 }
 
-/// What some voxels fill, world, metres.
+/// Bounds of some voxels; world frame, metres.
 pub(crate) fn bounds<'a>(cells: impl IntoIterator<Item = &'a OccupancyCell>) -> Aabb {
     let mut out = Aabb::EMPTY;
     for cell in cells {

@@ -1,49 +1,52 @@
-//! Voxels of what stands still in two sessions, and what each session's beams say of the other's,
-//! in; what appeared, went and moved out.
+//! Finds the things that appeared, went or moved between two sessions, from the occupied voxels of
+//! both.
 
 use crate::occupancy::{EDGE, OccupancyCell, REACH, SessionOccupancy, bounds, connected};
-use crate::split::parted;
+use crate::split::split_by_size;
 use contract::Fan;
 use geometry::Aabb;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Voxels with few points that are so many steps apart are of one thing: rows of beams that only
-/// graze it lie that far apart.
+/// Voxels with few points at most this many steps apart belong to one thing: rows of beams that
+/// graze a surface lie that far apart.
 const THIN_REACH: i32 = 3;
-/// A thing of which at least this share changed is looked at whole.
+/// Least share of a connected thing that must have changed for the whole thing to be compared.
 const WHOLE: f64 = 0.2;
-/// Most voxels of a thing that is looked at whole: what is larger is structure that something stood
-/// against.
+/// Largest number of voxels of a thing that is compared as a whole. Anything larger is a structure
+/// that the thing stood against.
 const MAX_WHOLE: usize = 40_000;
-/// Of a thing that one session sees only in part, the other may see up to so many times the ground;
-/// where one of its sides is seen in all its length, that may be all that is seen.
+/// Largest ratio of the footprints of one thing in two sessions, where one saw only a part of it.
+/// The second value applies where one side was seen in its full length, which may be all that was
+/// seen.
 const MAX_PART: [f64; 2] = [2.5, 6.0];
-/// A change on so many times the ground of one in the other session may be that thing and another
-/// one beside it; one on more is no pair of things, and would take long to look through.
+/// Range of the ratio of footprints in which a change may consist of a thing of the other session
+/// and another thing beside it. A change that is larger is no pair, and would take long to search.
 const WIDER: [f64; 2] = [1.4, 6.0];
-/// How much the sizes of a thing may differ between two sessions, which see other sides of it, but
-/// both its top: metres, and share of its sides and of its height.
+/// Tolerance between the sizes of one thing in two sessions, which see different sides of it: a
+/// length in metres, or, where larger, a share of each of its sides and of its height, whose top
+/// both see.
 const SAME_SIZE: (f64, [f64; 3]) = (0.12, [0.2, 0.2, 0.1]);
-/// What has no more than this share of a thing's height, and its top as high as that one's, to so
-/// many metres, and the same sides, is its top seen over something that hides the rest.
+/// A change that is flatter than this share of another's height, whose top is within `SAME_TOP`
+/// metres of the other's and whose sides agree, is the other's top, seen over something that hides
+/// the rest.
 const FLAT: f64 = 0.5;
 const SAME_TOP: f64 = 0.08;
 
-/// So near each other are the ends of a thing of which something before it hides the middle,
+/// Largest gap between the ends of a thing whose middle is hidden by something in front of it,
 /// metres.
 const BESIDE: f64 = 0.1;
 
-/// What is tuned.
+/// The settings of the search for things.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThingSettings {
-    /// Smallest larger edge of a change, metres.
+    /// Least length of the longest edge of a change, metres.
     pub min_size: f64,
-    /// Fewest voxels and points of it.
+    /// Fewest voxels of a change.
     pub min_voxels: usize,
-    /// Fewest points of it.
+    /// Fewest points of a change.
     pub min_points: u32,
-    /// How near a robot's points a change is the robot's own, metres: what segmentation left of
-    /// it.
+    /// Distance from a robot's points within which a change is attributed to the robot, metres:
+    /// points that segmentation did not assign.
     pub robot_margin: f64,
 }
 
@@ -53,35 +56,36 @@ impl Default for ThingSettings {
     }
 }
 
-/// What became of a thing.
+/// How a thing changed between the sessions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ThingChange {
-    /// It was not there before.
+    /// The thing is new.
     Appeared,
-    /// It is no longer there.
+    /// The thing is no longer there.
     Gone,
-    /// It stands elsewhere.
+    /// The thing stands in another place.
     Moved,
 }
 
-/// A thing that stands still and is not where it was.
+/// A thing that is not part of a robot and changed between the sessions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Thing {
-    /// What became of it.
+    /// How it changed.
     pub change: ThingChange,
-    /// Bounds before, world, metres.
+    /// Bounds in the earlier session; world frame, metres.
     pub then: Option<Aabb>,
-    /// Bounds now.
+    /// Bounds in the later session; world frame, metres.
     pub now: Option<Aabb>,
-    /// Middle now less middle then, metres, where it moved.
+    /// Centre of the later bounds minus that of the earlier ones, metres, if the thing moved.
     pub shift: Option<[f64; 3]>,
-    /// Volume of the voxels that changed, m³: its surface, as far as it was seen.
+    /// Volume of the voxels that changed, m³. They lie on the surface of the thing, as far as it
+    /// was seen.
     pub volume: f64,
-    /// Points in them.
+    /// Number of points in these voxels.
     pub n_points: u64,
-    /// Voxels that are empty now.
+    /// Voxels that are empty in the later session.
     pub gone: Vec<OccupancyCell>,
-    /// Voxels that are filled now.
+    /// Voxels that are filled in the later session.
     pub filled: Vec<OccupancyCell>,
 }
 
@@ -91,15 +95,15 @@ struct ChangePiece {
     cells: Vec<OccupancyCell>,
     n_points: u64,
     bounds: Aabb,
-    /// With rows of beams about it that graze the thing, and whatever else lies there.
+    /// Bounds with sparse voxels around it, where beams graze the thing or hit something beside it.
     wide: Aabb,
-    /// Of all that it is connected with, where much of that changed: a thing pushed by less than
-    /// its length stands in part where it stood.
+    /// Bounds of the whole connected thing, if a large share of it changed. A thing pushed by less
+    /// than its length stands partly where it stood before.
     whole: Option<Aabb>,
 }
 
 impl ChangePiece {
-    /// Several as one; `None` of none.
+    /// Joins several pieces to one; `None` if there are none.
     fn of<'p>(pieces: impl Iterator<Item = &'p Self>) -> Option<Self> {
         pieces.cloned().reduce(|mut all, more| {
             all.cells.extend(more.cells);
@@ -110,14 +114,14 @@ impl ChangePiece {
         })
     }
 
-    /// Bounds that the thing may have.
+    /// The bounds that the thing may have.
     fn boxes(&self) -> impl Iterator<Item = &Aabb> {
         self.whole.iter().chain([&self.wide, &self.bounds])
     }
 }
 
 impl SessionOccupancy {
-    /// Connected changes that are large enough and no robot's.
+    /// Connected changes that are large enough and do not belong to a robot.
     fn pieces(&self, other: &Self, settings: &ThingSettings) -> Vec<ChangePiece> {
         let mut thin = self.changed(other);
         let mut left: BTreeSet<OccupancyCell> =
@@ -139,29 +143,29 @@ impl SessionOccupancy {
         self.wholes(self.joined(out, thin))
     }
 
-    /// Changes, those in two of which one is as the other session has it and stands beside
-    /// something else.
-    fn apart(
+    /// The changes, each split in two where one part agrees with a thing of the other session and
+    /// the rest is another thing beside it.
+    fn separated(
         &self,
         pieces: &[ChangePiece],
         others: &[ChangePiece],
         settings: &ThingSettings,
     ) -> Vec<ChangePiece> {
-        let two = |piece: &ChangePiece| {
+        let split = |piece: &ChangePiece| {
             let times = |other: &Aabb| ground(&piece.bounds) / ground(other);
             let boxes = others.iter().flat_map(ChangePiece::boxes);
             let smaller = boxes.filter(|o| (WIDER[0]..WIDER[1]).contains(&times(o)));
             let parts = smaller.filter_map(|other| {
-                let parts = parted(&piece.cells, other.size())?;
-                let is_it = unlike(&bounds(&parts[0]), other) <= 1.0;
+                let parts = split_by_size(&piece.cells, other.size())?;
+                let is_it = size_difference(&bounds(&parts[0]), other) <= 1.0;
                 (is_it && self.is_thing(&parts[1], settings)).then_some(parts)
             });
             parts.map(|parts| parts.map(|cells| self.piece_of(cells))).next()
         };
-        pieces.iter().flat_map(|p| two(p).map_or_else(|| vec![p.clone()], Vec::from)).collect()
+        pieces.iter().flat_map(|p| split(p).map_or_else(|| vec![p.clone()], Vec::from)).collect()
     }
 
-    /// Changes of which few points are seen between them are one thing.
+    /// Joins changes that are connected by sparse voxels to one thing.
     fn joined(
         &self,
         pieces: Vec<Vec<OccupancyCell>>,
@@ -189,16 +193,16 @@ impl SessionOccupancy {
         cells.len() >= settings.min_voxels
             && self.n_points(cells) >= u64::from(settings.min_points)
             && size >= settings.min_size
-            && self.is_closed(cells)
+            && self.is_opaque(cells)
     }
 
-    /// One of two that stand side by side: what is about it is the other.
+    /// Makes a piece of voxels, with the bounds of exactly these.
     fn piece_of(&self, cells: Vec<OccupancyCell>) -> ChangePiece {
         let bounds = bounds(&cells);
         ChangePiece { n_points: self.n_points(&cells), bounds, wide: bounds, whole: None, cells }
     }
 
-    /// Changes, those joined that are parts of one thing which stands apart from others.
+    /// Joins changes that are parts of one connected thing.
     fn wholes(&self, mut pieces: Vec<ChangePiece>) -> Vec<ChangePiece> {
         let mut out = Vec::new();
         while let Some(mut piece) = pieces.pop() {
@@ -224,7 +228,8 @@ impl SessionOccupancy {
         out
     }
 
-    /// All that some voxels are connected with: [`MAX_WHOLE`] and more where that is much.
+    /// The solid voxels that some voxels are connected with; the search stops at about
+    /// [`MAX_WHOLE`].
     fn standing(&self, cells: &[OccupancyCell]) -> BTreeSet<OccupancyCell> {
         let mut all: BTreeSet<OccupancyCell> = cells.iter().copied().collect();
         for first in cells {
@@ -236,8 +241,9 @@ impl SessionOccupancy {
     }
 }
 
-/// What differs between two sessions: things that moved, then those that went, then those that
-/// appeared, each by size.
+/// Finds the things that differ between two sessions: first those that moved, then those that went,
+/// then those that appeared, each sorted by descending number of voxels. The two directions of the
+/// comparison run on `fan`.
 #[must_use]
 pub fn things(
     then: &SessionOccupancy,
@@ -251,8 +257,8 @@ pub fn things(
     };
     let pieces =
         fan.fan(vec![(then, now), (now, then)], |(own, other)| own.pieces(other, settings));
-    let gone = by_size(then.apart(&pieces[0], &pieces[1], settings));
-    let filled = by_size(now.apart(&pieces[1], &pieces[0], settings));
+    let gone = by_size(then.separated(&pieces[0], &pieces[1], settings));
+    let filled = by_size(now.separated(&pieces[1], &pieces[0], settings));
     let mut moved = moved(&gone, &filled);
     complete(&mut moved, [&gone, &filled]);
     let one = |pair: &MovedPair| {
@@ -275,14 +281,15 @@ pub fn things(
     out
 }
 
-/// A thing that stands elsewhere: changes that it is made of, then and now, and its bounds.
+/// A thing that moved: the indices of its pieces and its bounds (world frame, metres), each in the
+/// earlier and in the later session.
 struct MovedPair {
     parts: [Vec<usize>; 2],
     boxes: [Aabb; 2],
 }
 
-/// Adds to things of which one session saw pieces apart from each other what makes them as large as
-/// the other one saw them.
+/// Adds further pieces to moved things of which one session saw several pieces, as long as the size
+/// comes nearer to that of the other session.
 fn complete(moved: &mut [MovedPair], pieces: [&[ChangePiece]; 2]) {
     for at in 0..moved.len() {
         for side in 0..2 {
@@ -293,7 +300,7 @@ fn complete(moved: &mut [MovedPair], pieces: [&[ChangePiece]; 2]) {
                 let pair = &mut moved[at];
                 let (own, other) = (pair.boxes[side], pair.boxes[1 - side]);
                 let with = own.union(&piece.bounds);
-                let [before, after] = [&own, &with].map(|b| farthest_off(b, &other));
+                let [before, after] = [&own, &with].map(|b| largest_difference(b, &other));
                 let is_rest = after <= 1.0 && after < before;
                 if is_rest || is_end(&piece.bounds, &own, &other) {
                     pair.boxes[side] = with;
@@ -304,32 +311,34 @@ fn complete(moved: &mut [MovedPair], pieces: [&[ChangePiece]; 2]) {
     }
 }
 
-/// Whether a piece is an end of a thing of which `own` was seen, where the other session saw
-/// `other`: beside it, as high as it, and both together are more like that one, and no larger. A
-/// thing that was turned has other bounds.
+/// Whether a piece is one end of a thing of which `own` was seen, where the other session saw
+/// `other`: it lies beside `own`, its top is as high, and both together are more like `other` in
+/// size and not larger. The bounds of a thing that turned differ.
 fn is_end(piece: &Aabb, own: &Aabb, other: &Aabb) -> bool {
     let with = sides(&own.union(piece));
     let (own_sides, other) = (sides(own), sides(other));
-    let is_within = (0..3).all(|i| with[i] - other[i] <= same(&with, &other, i));
-    let all_off = |a: &[f64; 3]| (0..3).map(|i| off(a, &other, i)).sum::<f64>();
+    let is_within = (0..3).all(|i| with[i] - other[i] <= tolerance(&with, &other, i));
+    let sum_of_differences =
+        |a: &[f64; 3]| (0..3).map(|i| relative_difference(a, &other, i)).sum::<f64>();
     own.grown(BESIDE).touches(piece)
         && (piece.max[2] - own.max[2]).abs() <= SAME_TOP
         && is_within
-        && all_off(&with) < all_off(&own_sides)
+        && sum_of_differences(&with) < sum_of_differences(&own_sides)
 }
 
-/// Which of those that went stands elsewhere and the bounds there and here, the most alike first
-/// chosen: a barrel must not take a pallet's new place.
+/// Pairs pieces that went with pieces that appeared, where their sizes agree. The most similar
+/// pairs are chosen first, so that a barrel does not take the new place of a pallet.
 fn moved(gone: &[ChangePiece], filled: &[ChangePiece]) -> Vec<MovedPair> {
     let pairs = (0..gone.len()).flat_map(|i| (0..filled.len()).map(move |j| (i, j)));
     let alike = pairs.filter_map(|(i, j)| {
         let (was, is) = (&gone[i], &filled[j]);
         let pair = |then: &Aabb, now: &Aabb| {
             let [then, now] = [lowered(then, now), lowered(now, then)];
-            (unlike(&then, &now), i, j, [then, now])
+            (size_difference(&then, &now), i, j, [then, now])
         };
         let others = was.boxes().flat_map(|then| is.boxes().map(move |now| pair(then, now)));
-        // Whole first: the two strips of a thing that was pushed a little are alike as well.
+        // The whole things are compared first: a thing that was pushed a little leaves two strips,
+        // which are similar, too.
         let whole = was.whole.zip(is.whole).map(|(then, now)| pair(&then, &now));
         let is_alike = |pair: &(f64, usize, usize, [Aabb; 2])| pair.0 <= 1.0;
         whole.filter(is_alike).or(others.filter(is_alike).min_by(|a, b| a.0.total_cmp(&b.0)))
@@ -356,12 +365,12 @@ fn thing(change: ThingChange, was: Option<&ChangePiece>, is: Option<&ChangePiece
     Thing { change, then, now, shift: None, volume, n_points, gone, filled }
 }
 
-/// A box that may be the top of another one, of which one session saw no more: then down to where
-/// the other stands.
+/// If a box may be the top of another one of which its session saw no more, the box extended down
+/// to the base of the other; otherwise the box itself.
 fn lowered(top: &Aabb, other: &Aabb) -> Aabb {
     let is_flat = top.size()[2] < FLAT * other.size()[2];
     let is_as_high = (top.max[2] - other.max[2]).abs() <= SAME_TOP;
-    let is_alike = (0..2).all(|i| off(&sides(top), &sides(other), i) <= 1.0);
+    let is_alike = (0..2).all(|i| relative_difference(&sides(top), &sides(other), i) <= 1.0);
     let mut out = *top;
     if is_flat && is_as_high && is_alike {
         out.min[2] = other.min[2];
@@ -369,44 +378,45 @@ fn lowered(top: &Aabb, other: &Aabb) -> Aabb {
     out
 }
 
-/// Shorter and longer side on the ground, and height, metres.
+/// The shorter and the longer side on the ground and the height of a box, metres.
 fn sides(bounds: &Aabb) -> [f64; 3] {
     let [w, d, h] = bounds.size();
     [w.min(d), w.max(d), h]
 }
 
-/// How much a side may differ, metres.
-fn same(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
+/// Tolerance of a side, metres.
+fn tolerance(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
     SAME_SIZE.0.max(SAME_SIZE.1[i] * a[i].max(b[i]))
 }
 
-/// How much it does, in parts of that.
-fn off(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
-    (a[i] - b[i]).abs() / same(a, b, i)
+/// Difference of a side as a multiple of its tolerance.
+fn relative_difference(a: &[f64; 3], b: &[f64; 3], i: usize) -> f64 {
+    (a[i] - b[i]).abs() / tolerance(a, b, i)
 }
 
-/// How much the side that differs most does.
-fn farthest_off(a: &Aabb, b: &Aabb) -> f64 {
+/// The largest difference of any side as a multiple of its tolerance.
+fn largest_difference(a: &Aabb, b: &Aabb) -> f64 {
     let (a, b) = (sides(a), sides(b));
-    (0..3).map(|i| off(&a, &b, i)).fold(0.0, f64::max)
+    (0..3).map(|i| relative_difference(&a, &b, i)).fold(0.0, f64::max)
 }
 
-/// How much two boxes differ in size, however they are turned about the vertical: up to 1 they may
-/// be one thing, of which one session saw less than the other.
-fn unlike(a: &Aabb, b: &Aabb) -> f64 {
+/// Difference of the sizes of two boxes, whatever their rotation about the vertical axis. Up to 1
+/// they may be one thing, of which one session may have seen less than the other.
+fn size_difference(a: &Aabb, b: &Aabb) -> f64 {
     let (a, b) = (sides(a), sides(b));
-    let (same, off) = (|i: usize| same(&a, &b, i), |i: usize| off(&a, &b, i));
-    // The smaller one within the larger one, and no small part of it.
+    let (tolerance, relative_difference) =
+        (|i: usize| tolerance(&a, &b, i), |i: usize| relative_difference(&a, &b, i));
+    // The smaller one must fit into the larger one, and must not be a small part of it.
     let (small, large) = if a[0] * a[1] < b[0] * b[1] { (a, b) } else { (b, a) };
-    let beyond = |i: usize| (small[i] - large[i]) / same(i);
-    let is_side = (0..2).any(|i| (small[1] - large[i]).abs() <= same(i));
+    let beyond = |i: usize| (small[i] - large[i]) / tolerance(i);
+    let is_side = (0..2).any(|i| (small[1] - large[i]).abs() <= tolerance(i));
     let part =
         large[0] * large[1] / (small[0] * small[1]).max(1e-9) / MAX_PART[usize::from(is_side)];
-    let seen_less = beyond(0).max(beyond(1)).max(part).max(off(2));
-    (0..3).map(off).fold(0.0, f64::max).min(seen_less)
+    let partial_view = beyond(0).max(beyond(1)).max(part).max(relative_difference(2));
+    (0..3).map(relative_difference).fold(0.0, f64::max).min(partial_view)
 }
 
-/// Area of the ground under a box, m².
+/// Area of the footprint of a box, m².
 fn ground(bounds: &Aabb) -> f64 {
     let [w, d, _] = bounds.size();
     w * d

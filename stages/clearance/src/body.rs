@@ -1,9 +1,9 @@
 //! A robot with the points attached to it: which of its parts are near which obstacles in a
 //! posture.
 
-use crate::ContactLevel;
-use crate::evidence::{by_each_other, enough};
-use crate::obstacle::{HALF_CELL, Obstacle, What};
+use crate::contact_level::ContactLevel;
+use crate::evidence::{supported_by_others, surface_threshold};
+use crate::obstacle::{HALF_CELL, Obstacle, ObstacleKind};
 use crate::obstacles::{Bin, Obstacles, Replaced};
 use crate::shape::{Gap, PartShape};
 use contract::Fan;
@@ -11,36 +11,36 @@ use geometry::{Aabb, Point, Pose};
 use robot::{Link, Model};
 use std::collections::BTreeMap;
 
-/// No point of the robot moves farther from one posture that is looked at to the next, metres.
+/// Largest distance that a point of the robot moves between two examined postures, metres.
 pub const STEP: f64 = 0.01;
 
 /// Points attached to the links of a robot, by index of the link, link frame, metres.
-pub type Hung = BTreeMap<usize, Vec<[f32; 3]>>;
+pub type AttachedPoints = BTreeMap<usize, Vec<[f32; 3]>>;
 
 /// Distance that a part may move between two examined postures of a path, metres.
 const BETWEEN: f32 = 0.5 * STEP as f32;
 
 /// Distance from the robot as scanned within which uncertain points are most likely its own,
 /// metres: edges, cables and covers that its model lacks.
-const BESIDE: f32 = 0.1;
+const BESIDE_REACH: f32 = 0.1;
 
-/// Distance from a link's surface as scanned within which a point belongs to the link, metres: the
-/// labels of links reach 6 to 12 mm. Of a thing that touches the robot, all points farther off
-/// stay.
-const OWN: f32 = 0.008;
+/// Distance from a link's surface as scanned within which a point belongs to the link, metres.
+/// Labels of links reach 6 to 12 mm. The points of an object that touches the robot remain beyond
+/// this distance.
+const SURFACE_REACH: f32 = 0.008;
 
 /// Distance from the robot as scanned within which unseen space is a gap between its parts or
 /// behind them, metres; an object that stands there would reach farther.
-const CREVICE: f32 = 0.025;
+const UNSEEN_GAP: f32 = 0.025;
 
 /// Distance from fixed points within which uncertain points belong to the fixed object and are not
 /// attached to the robot, metres.
-const JOINED: f32 = 0.04;
+const FIXED_REACH: f32 = 0.04;
 
 /// The surface of a link, or the points attached to it.
 pub(crate) struct BodyPart {
     pub(crate) link: usize,
-    pub(crate) hangs: bool,
+    pub(crate) is_attached: bool,
     /// Whether it consists of uncertain points beside the link, which may or may not be attached.
     pub(crate) is_doubtful: bool,
     bounds: Aabb,
@@ -59,14 +59,14 @@ pub struct RobotBody<'a> {
 }
 
 impl BodyPart {
-    fn hung(link: usize, points: Vec<[f32; 3]>, within: f32) -> Self {
+    fn attached(link: usize, points: Vec<[f32; 3]>, within: f32) -> Self {
         let bounds = Aabb::of(points.iter().map(|p| p.map(f64::from)));
         Self {
             link,
-            hangs: true,
+            is_attached: true,
             is_doubtful: false,
             bounds,
-            shape: PartShape::hung(points, within),
+            shape: PartShape::attached(points, within),
         }
     }
 }
@@ -91,10 +91,16 @@ pub(crate) struct PostureNear {
 }
 
 impl<'a> RobotBody<'a> {
-    /// The moving parts of a model with the attached points `hung`. `margin` is the distance below
+    /// The moving parts of a model with the points attached to it. `margin` is the distance below
     /// which an obstacle counts as near, and `largest` the radius of the largest obstacle, metres.
     #[must_use]
-    pub fn new(model: &'a Model, hung: Hung, margin: f64, largest: f64, fan: &dyn Fan) -> Self {
+    pub fn new(
+        model: &'a Model,
+        attached: AttachedPoints,
+        margin: f64,
+        largest: f64,
+        fan: &dyn Fan,
+    ) -> Self {
         let margin = margin as f32;
         let least = margin + BETWEEN + HALF_CELL;
         let moves = model.moving();
@@ -102,15 +108,15 @@ impl<'a> RobotBody<'a> {
         let surfaces = fan.fan(all, |link| {
             let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
             let shape = PartShape::surface(mesh, &bounds, least)?;
-            Some(BodyPart { link, hangs: false, is_doubtful: false, bounds, shape })
+            Some(BodyPart { link, is_attached: false, is_doubtful: false, bounds, shape })
         });
         let (mut parts, still): (Vec<BodyPart>, Vec<BodyPart>) =
             surfaces.into_iter().flatten().partition(|part| moves[part.link]);
-        let within = margin.max(BESIDE) + BETWEEN + largest as f32;
+        let within = margin.max(BESIDE_REACH) + BETWEEN + largest as f32;
         for (link, points) in
-            hung.into_iter().filter(|(link, points)| moves[*link] && !points.is_empty())
+            attached.into_iter().filter(|(link, points)| moves[*link] && !points.is_empty())
         {
-            parts.push(BodyPart::hung(link, points, within));
+            parts.push(BodyPart::attached(link, points, within));
         }
         Self { model, parts, still, margin, within }
     }
@@ -129,53 +135,59 @@ impl<'a> RobotBody<'a> {
     }
 
     /// Removes from `around` what belongs to the robot itself in the posture `found`, in which it
-    /// was scanned: points on or inside its surface, whatever their label, strays beside it, and
-    /// unseen space that the robot filled. A point beside it is a stray where space is known and
-    /// only points of the robot itself are its neighbours. Uncertain points beside it count twice: as obstacles [`What::Beside`], and
-    /// as points that may be attached to the nearest part and move with it.
-    pub fn stand(&mut self, found: &[f64], around: &mut Obstacles) {
+    /// was scanned. These are points on or inside its surface, whatever their label, stray points
+    /// beside it, and unseen space that the robot filled. A point beside the robot is a stray point
+    /// if space is known and all its neighbours are points of the robot.
+    ///
+    /// Uncertain points beside the robot count twice: as obstacles [`ObstacleKind::Beside`], and as
+    /// points that may be attached to the nearest part and move with it.
+    pub fn remove_robot(&mut self, found: &[f64], around: &mut Obstacles) {
         let mut near: Vec<Option<(f32, usize)>> = vec![None; around.all.len()];
-        for PartTouch { part, obstacle, gap, .. } in self.within(BESIDE, found, around).touches {
+        for PartTouch { part, obstacle, gap, .. } in
+            self.within(BESIDE_REACH, found, around).touches
+        {
             let least = near[obstacle].get_or_insert((gap, part));
             if gap < least.0 {
                 *least = (gap, part);
             }
         }
         let poses = self.model.poses(found);
-        let from_base = |link: usize| Flat::of(&poses[link].inverse());
-        let surfaces = self.parts.iter().filter(|part| !part.hangs).chain(&self.still);
-        let surfaces: Vec<(&BodyPart, Flat)> =
+        let from_base = |link: usize| PoseF32::of(&poses[link].inverse());
+        let surfaces = self.parts.iter().filter(|part| !part.is_attached).chain(&self.still);
+        let surfaces: Vec<(&BodyPart, PoseF32)> =
             surfaces.map(|part| (part, from_base(part.link))).collect();
-        let is_own = |at: [f32; 3], within: f32| {
+        let is_on_robot = |at: [f32; 3], within: f32| {
             surfaces.iter().any(|(part, link_from_base)| {
                 let p = link_from_base.of_point(at);
                 is_near(&part.bounds, p, within) && part.shape.gap(p, within) != Gap::Far
             })
         };
-        let is_stray = strays(around, &near, |o| is_own(o.at, OWN));
-        let (mut doubtful, split) = (Hung::new(), around.split.clone());
-        let fixed = around.fixed(JOINED);
+        let is_stray = strays(around, &near, |o| is_on_robot(o.at, SURFACE_REACH));
+        let (mut doubtful, split) = (AttachedPoints::new(), around.split.clone());
+        let fixed = around.fixed(FIXED_REACH);
         around.replace(|at, o| match (near[at], o.what) {
             (None, _) => Replaced::Kept,
-            (_, What::Fixed | What::Uncertain) if is_stray[at] => Replaced::By(Vec::new()),
-            (Some((_, part)), What::Uncertain) => {
+            (_, ObstacleKind::Fixed | ObstacleKind::Uncertain) if is_stray[at] => {
+                Replaced::By(Vec::new())
+            }
+            (Some((_, part)), ObstacleKind::Uncertain) => {
                 let link = self.parts[part].link;
                 if fixed.is_near(o.at) {
-                    return Replaced::By(vec![Obstacle { what: What::Beside, ..*o }]);
+                    return Replaced::By(vec![Obstacle { what: ObstacleKind::Beside, ..*o }]);
                 }
                 doubtful.entry(link).or_default().push(from_base(link).of_point(o.at));
-                Replaced::By(vec![Obstacle { what: What::Beside, ..*o }])
+                Replaced::By(vec![Obstacle { what: ObstacleKind::Beside, ..*o }])
             }
-            (_, What::Unseen) => match split.parts(o) {
-                Some(parts) => {
-                    Replaced::By(parts.filter(|p| !is_own(p.at, p.radius + CREVICE)).collect())
-                }
+            (_, ObstacleKind::Unseen) => match split.parts(o) {
+                Some(parts) => Replaced::By(
+                    parts.filter(|p| !is_on_robot(p.at, p.radius + UNSEEN_GAP)).collect(),
+                ),
                 None => Replaced::Kept,
             },
             _ => Replaced::Kept,
         });
         for (link, points) in doubtful {
-            let part = BodyPart::hung(link, points, self.within);
+            let part = BodyPart::attached(link, points, self.within);
             self.parts.push(BodyPart { is_doubtful: true, ..part });
         }
     }
@@ -196,13 +208,13 @@ impl<'a> RobotBody<'a> {
         for (at, part) in self.parts.iter().enumerate() {
             let base_from_link = &poses[part.link];
             let grown = part.bounds.grown(f64::from(margin + BETWEEN));
-            if around.leaves(&grown, base_from_link) {
+            if around.reaches_unknown(&grown, base_from_link) {
                 out.outside.push(at);
             }
-            let link_from_base = Flat::of(&base_from_link.inverse());
+            let link_from_base = PoseF32::of(&base_from_link.inverse());
             for bin in &around.bins {
-                let asked = PartQuery { at, margin, link_from_base: &link_from_base };
-                self.bin(&asked, bin, around, &mut out.touches);
+                let query = PartQuery { at, margin, link_from_base: &link_from_base };
+                self.bin(&query, bin, around, &mut out.touches);
             }
         }
         out
@@ -210,26 +222,26 @@ impl<'a> RobotBody<'a> {
 
     fn bin(
         &self,
-        asked: &PartQuery<'_>,
+        query: &PartQuery<'_>,
         bin: &Bin,
         around: &Obstacles,
         touches: &mut Vec<PartTouch>,
     ) {
-        let &PartQuery { at, margin, link_from_base } = asked;
+        let &PartQuery { at, margin, link_from_base } = query;
         let part = &self.parts[at];
         let middle = link_from_base.of_point(bin.middle);
         let within = bin.radius + margin + BETWEEN;
         if !is_near(&part.bounds, middle, within) {
             return;
         }
-        let own = bin.range.clone().zip(&around.all[bin.range.clone()]);
+        let obstacles = bin.range.clone().zip(&around.all[bin.range.clone()]);
         // Attached points give distances only up to the limit they were prepared for.
-        if part.shape.tells_all() && part.shape.gap(middle, within) == Gap::Far {
+        if part.shape.is_unlimited() && part.shape.gap(middle, within) == Gap::Far {
             return;
         }
-        for (obstacle, o) in own {
+        for (obstacle, o) in obstacles {
             // Points that may be attached to the robot are no obstacle to themselves.
-            if part.is_doubtful && o.what == What::Beside {
+            if part.is_doubtful && o.what == ObstacleKind::Beside {
                 continue;
             }
             let p = link_from_base.of_point(o.at);
@@ -242,7 +254,7 @@ impl<'a> RobotBody<'a> {
                 Gap::Inside => touches.push(inside(at, obstacle, o)),
                 Gap::At(gap) => {
                     let touch = touch(at, obstacle, o, margin, gap);
-                    let is_so = |touch: &PartTouch| {
+                    let is_confirmed = |touch: &PartTouch| {
                         around.split.parts(o).is_none_or(|mut parts| {
                             parts.any(|o| {
                                 let p = link_from_base.of_point(o.at);
@@ -250,24 +262,25 @@ impl<'a> RobotBody<'a> {
                             })
                         }) || touch.level != ContactLevel::Unseen
                     };
-                    touches.extend(touch.filter(is_so));
+                    touches.extend(touch.filter(is_confirmed));
                 }
             }
         }
     }
 }
 
-/// For each obstacle, whether it is the robot's own or a stray: of the points that are near the
-/// robot as scanned, those on its surface and, where space is known, those beside it that no others
-/// support.
+/// For each obstacle, whether it belongs to the robot or is a stray point: of the points near the
+/// robot as scanned, those on its surface and, where space is known, those beside it that no other
+/// points support. `near` has, for each obstacle near the robot, its distance in metres and the
+/// index of the nearest part.
 fn strays(
     around: &Obstacles,
     near: &[Option<(f32, usize)>],
-    is_own: impl Fn(&Obstacle) -> bool,
+    is_on_robot: impl Fn(&Obstacle) -> bool,
 ) -> Vec<bool> {
-    let is_point = |o: &Obstacle| matches!(o.what, What::Fixed | What::Uncertain);
+    let is_point = |o: &Obstacle| matches!(o.what, ObstacleKind::Fixed | ObstacleKind::Uncertain);
     let mut out: Vec<bool> = (around.all.iter().zip(near))
-        .map(|(o, near)| near.is_some() && is_point(o) && is_own(o))
+        .map(|(o, near)| near.is_some() && is_point(o) && is_on_robot(o))
         .collect();
     if around.split.is_empty() {
         return out;
@@ -276,7 +289,8 @@ fn strays(
     let others: Vec<usize> =
         (0..out.len()).filter(|&at| is_point(&around.all[at]) && !out[at]).collect();
     let all: Vec<Obstacle> = others.iter().map(|&at| around.all[at]).collect();
-    let is_evident = by_each_other(&all, enough(&points), |k| near[others[k]].is_some());
+    let is_evident =
+        supported_by_others(&all, surface_threshold(&points), |k| near[others[k]].is_some());
     for (at, is_evident) in others.into_iter().zip(is_evident) {
         out[at] = near[at].is_some() && !is_evident;
     }
@@ -288,7 +302,7 @@ fn touch(part: usize, obstacle: usize, o: &Obstacle, margin: f32, gap: f32) -> O
     let gap = gap - o.radius - BETWEEN;
     let level = match o.what {
         _ if gap > margin => return None,
-        What::Unseen => ContactLevel::Unseen,
+        ObstacleKind::Unseen => ContactLevel::Unseen,
         _ if gap <= 0.0 => ContactLevel::Hit,
         _ => ContactLevel::Near,
     };
@@ -296,7 +310,8 @@ fn touch(part: usize, obstacle: usize, o: &Obstacle, margin: f32, gap: f32) -> O
 }
 
 fn inside(part: usize, obstacle: usize, o: &Obstacle) -> PartTouch {
-    let level = if o.what == What::Unseen { ContactLevel::Unseen } else { ContactLevel::Inside };
+    let level =
+        if o.what == ObstacleKind::Unseen { ContactLevel::Unseen } else { ContactLevel::Inside };
     PartTouch { part, obstacle, level, gap: 0.0 }
 }
 
@@ -323,22 +338,22 @@ fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {
     (0..3).map(|i| outside(i).powi(2)).sum::<f64>() <= f64::from(within).powi(2)
 }
 
-/// A part that is asked what is near to it.
+/// A query for the obstacles near one part.
 struct PartQuery<'a> {
     /// Index of the part.
     at: usize,
-    /// What counts as near, metres.
+    /// Largest distance that counts as near, metres.
     margin: f32,
-    link_from_base: &'a Flat,
+    link_from_base: &'a PoseF32,
 }
 
 /// A pose in single precision, for many points.
-struct Flat {
+struct PoseF32 {
     rotation: [[f32; 3]; 3],
     shift: [f32; 3],
 }
 
-impl Flat {
+impl PoseF32 {
     fn of(pose: &Pose) -> Self {
         let m = pose.rotation.to_rotation_matrix();
         let rotation = std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)] as f32));

@@ -6,7 +6,7 @@
 //! wire do. A point without either is dropped if it lies in space that beams passed through. Points
 //! of beams that grazed the edge of a robot count only as part of a surface.
 
-use crate::obstacle::{HALF_CELL, Obstacle, What, distance};
+use crate::obstacle::{HALF_CELL, Obstacle, ObstacleKind, distance};
 use contract::{Space, SpaceKind};
 use geometry::{Point, Pose};
 use rustc_hash::FxHashMap;
@@ -14,21 +14,21 @@ use rustc_hash::FxHashMap;
 /// Largest distance between neighbours on a surface, metres: the edge of the voxels of known space.
 const NEAR: f32 = 0.05;
 /// Number of neighbours from which on a point belongs to a surface.
-const ENOUGH: usize = 8;
+const MIN_NEIGHBOURS: usize = 8;
 /// Number of neighbours from which on a surface needs no other proof.
 const SOLID: usize = 24;
 /// In sparse scans, number of neighbours that suffices, as share of the median over all points.
 const SHARE: f64 = 0.125;
-/// Distance within which [`TOGETHER`] neighbours make a small object, metres; stray points lie
+/// Distance within which [`MIN_CLOSE`] neighbours make a small object, metres; stray points lie
 /// farther apart, over the depth that an edge hides.
 const CLOSE: f32 = 0.025;
 /// Number of neighbours within [`CLOSE`] that make a small object.
-const TOGETHER: usize = 3;
+const MIN_CLOSE: usize = 3;
 /// Largest distance between neighbours on a line, metres: beams 15 mm apart hit a wire of 4 mm
 /// about four times on twice this length.
-const ALONG: f32 = 0.15;
+const LINE_REACH: f32 = 0.15;
 /// Thickness of a line, metres: the wire, the scanner's noise, and the edge of a cell.
-const ACROSS: f32 = 0.010;
+const LINE_THICKNESS: f32 = 0.010;
 /// Number of other points that make a line.
 const ON_LINE: usize = 3;
 /// Largest number of unknown voxels among the six beside that of a point for its surroundings to
@@ -54,19 +54,19 @@ pub(crate) fn evident(
     let mut out = vec![true; all.len()];
     let Some(space) = space else { return out };
     // Floors and other robots are not known from single points only.
-    let is_asked = |o: &Obstacle| matches!(o.what, What::Fixed | What::Uncertain);
+    let is_point = |o: &Obstacle| matches!(o.what, ObstacleKind::Fixed | ObstacleKind::Uncertain);
     let cubes = Cubes::of(all);
     let thin: Vec<bool> = (all.iter())
-        .map(|o| is_asked(o) && !o.is_grazed && cubes.n_near(o, NEAR, SOLID) < SOLID)
+        .map(|o| is_point(o) && !o.is_grazed && cubes.n_near(o, NEAR, SOLID) < SOLID)
         .collect();
-    let enough = cubes.enough();
+    let surface_threshold = cubes.surface_threshold();
     let is_behind = behind(all, &thin);
     all.iter_mut().zip(is_behind).for_each(|(o, is_behind)| o.is_grazed |= is_behind);
     let cubes = Cubes::of(all);
-    for (at, o) in all.iter().enumerate().filter(|(_, o)| is_asked(o)) {
-        out[at] = cubes.n_near(o, NEAR, enough) >= enough
+    for (at, o) in all.iter().enumerate().filter(|(_, o)| is_point(o)) {
+        out[at] = cubes.n_near(o, NEAR, surface_threshold) >= surface_threshold
             || !o.is_grazed
-                && (cubes.is_thing(at) || !is_seen(space, &(world_from_base * place(o))));
+                && (cubes.is_small_object(at) || !is_seen(space, &(world_from_base * place(o))));
     }
     out
 }
@@ -74,34 +74,36 @@ pub(crate) fn evident(
 /// Selects, from points attached to a link (each with whether its beam grazed an edge), those that
 /// are evidence of an attached object.
 #[must_use]
-pub fn hanging(points: &[([f32; 3], bool)]) -> Vec<[f32; 3]> {
+pub fn attached_points(points: &[([f32; 3], bool)]) -> Vec<[f32; 3]> {
     let obstacle = |&(at, is_grazed): &([f32; 3], bool)| Obstacle {
         at,
         radius: HALF_CELL,
-        what: What::Uncertain,
+        what: ObstacleKind::Uncertain,
         is_grazed,
     };
     let all: Vec<Obstacle> = points.iter().map(obstacle).collect();
-    let told = by_each_other(&all, enough(&all), |_| true);
-    all.iter().zip(told).filter(|(_, is)| *is).map(|(o, _)| o.at).collect()
+    let is_evident = supported_by_others(&all, surface_threshold(&all), |_| true);
+    all.iter().zip(is_evident).filter(|(_, is)| *is).map(|(o, _)| o.at).collect()
 }
 
 /// Number of neighbours that makes a surface at the density of these points.
-pub(crate) fn enough(all: &[Obstacle]) -> usize {
-    Cubes::of(all).enough()
+pub(crate) fn surface_threshold(all: &[Obstacle]) -> usize {
+    Cubes::of(all).surface_threshold()
 }
 
 /// For each obstacle, whether the others are evidence that it belongs to an object: it lies on a
-/// surface (`enough` neighbours make one), on a line or among a few neighbours. Only told where
-/// `asks` holds.
-pub(crate) fn by_each_other(
+/// surface (`surface_threshold` neighbours make one), on a line or among a few neighbours. It is
+/// only computed where `is_needed` holds, and `false` elsewhere.
+pub(crate) fn supported_by_others(
     all: &[Obstacle],
-    enough: usize,
-    asks: impl Fn(usize) -> bool,
+    surface_threshold: usize,
+    is_needed: impl Fn(usize) -> bool,
 ) -> Vec<bool> {
     let cubes = Cubes::of(all);
     let is_evident = |(at, o): (usize, &Obstacle)| {
-        asks(at) && (cubes.n_near(o, NEAR, enough) >= enough || !o.is_grazed && cubes.is_thing(at))
+        is_needed(at)
+            && (cubes.n_near(o, NEAR, surface_threshold) >= surface_threshold
+                || !o.is_grazed && cubes.is_small_object(at))
     };
     all.iter().enumerate().map(is_evident).collect()
 }
@@ -137,41 +139,41 @@ impl<'a> Cubes<'a> {
     }
 
     /// Whether an obstacle belongs to a small object or to a line.
-    fn is_thing(&self, at: usize) -> bool {
-        self.n_near(&self.all[at], CLOSE, TOGETHER) >= TOGETHER || self.is_on_line(at)
+    fn is_small_object(&self, at: usize) -> bool {
+        self.n_near(&self.all[at], CLOSE, MIN_CLOSE) >= MIN_CLOSE || self.is_on_line(at)
     }
 
     /// Number of neighbours that makes a surface at the density of these scans.
-    fn enough(&self) -> usize {
+    fn surface_threshold(&self) -> usize {
         /// Number of points from which the median is taken.
-        const ASKED: usize = 2000;
-        let step = self.all.len() / ASKED + 1;
-        let most = (ENOUGH as f64 / SHARE) as usize;
+        const N_SAMPLED: usize = 2000;
+        let step = self.all.len() / N_SAMPLED + 1;
+        let most = (MIN_NEIGHBOURS as f64 / SHARE) as usize;
         let mut n: Vec<usize> =
             self.all.iter().step_by(step).map(|o| self.n_near(o, NEAR, most)).collect();
         n.sort_unstable();
         let median = n.get(n.len() / 2).copied().unwrap_or(0);
-        ((median as f64 * SHARE) as usize).clamp(1, ENOUGH)
+        ((median as f64 * SHARE) as usize).clamp(1, MIN_NEIGHBOURS)
     }
 
     /// Whether enough other obstacles lie on a line through an obstacle.
     fn is_on_line(&self, at: usize) -> bool {
         let here = self.all[at].at;
-        let reach = (ALONG / NEAR).ceil() as i32;
+        let reach = (LINE_REACH / NEAR).ceil() as i32;
         let off =
             |i: u32| -> [f32; 3] { std::array::from_fn(|k| self.all[i as usize].at[k] - here[k]) };
         let length = |v: [f32; 3]| v.iter().map(|v| v * v).sum::<f32>().sqrt();
         let near: Vec<[f32; 3]> = (self.around(here, reach))
             .filter(|i| *i as usize != at)
             .map(off)
-            .filter(|v| length(*v) < ALONG)
+            .filter(|v| length(*v) < LINE_REACH)
             .collect();
         // Points that are too near define no direction.
-        near.iter().filter(|v| length(**v) > 2.0 * ACROSS).any(|v| {
+        near.iter().filter(|v| length(**v) > 2.0 * LINE_THICKNESS).any(|v| {
             let unit = v.map(|c| c / length(*v));
             let across = |w: &&[f32; 3]| {
                 let along = (0..3).map(|k| w[k] * unit[k]).sum::<f32>();
-                length(std::array::from_fn(|k| w[k] - along * unit[k])) < ACROSS
+                length(std::array::from_fn(|k| w[k] - along * unit[k])) < LINE_THICKNESS
             };
             near.iter().filter(across).count() >= ON_LINE
         })
@@ -203,15 +205,15 @@ mod tests {
     use contract::SpaceGrid;
     use geometry::Aabb;
 
-    fn told(points: &[[f32; 3]], kind: SpaceKind) -> Vec<bool> {
-        told_by(points, kind, false)
+    fn evident_among(points: &[[f32; 3]], kind: SpaceKind) -> Vec<bool> {
+        evident_by(points, kind, false)
     }
 
-    fn told_by(points: &[[f32; 3]], kind: SpaceKind, grazed: bool) -> Vec<bool> {
+    fn evident_by(points: &[[f32; 3]], kind: SpaceKind, grazed: bool) -> Vec<bool> {
         // A distant wall with 1 cm between points sets the density of the scan.
         let wall = (0..2500).map(|i| [1.0, 0.01 * (i % 50) as f32, 0.01 * (i / 50) as f32]);
         let obstacle =
-            |(at, is_grazed)| Obstacle { at, radius: 0.0035, what: What::Fixed, is_grazed };
+            |(at, is_grazed)| Obstacle { at, radius: 0.0035, what: ObstacleKind::Fixed, is_grazed };
         let mut all: Vec<Obstacle> = (points.iter().map(|p| (*p, grazed)))
             .chain(wall.map(|p| (p, false)))
             .map(obstacle)
@@ -228,15 +230,15 @@ mod tests {
     #[test]
     fn strays_in_seen_space_are_evidence_of_nothing() {
         let strays = [[0.0, 0.0, 0.0], [0.03, 0.02, -0.02], [-0.02, 0.05, 0.05], [0.3, 0.3, 0.1]];
-        assert_eq!(told(&strays, SpaceKind::Free), [false; 4]);
+        assert_eq!(evident_among(&strays, SpaceKind::Free), [false; 4]);
         // Where no beam passed, each of them may be an object.
-        assert_eq!(told(&strays, SpaceKind::Unknown), [true; 4]);
+        assert_eq!(evident_among(&strays, SpaceKind::Unknown), [true; 4]);
     }
 
     #[test]
     fn a_small_thing_of_four_points_stays() {
         let hook = [[0.0, 0.0, 0.0], [0.012, 0.0, 0.0], [0.0, 0.0, 0.012], [0.012, 0.0, 0.012]];
-        assert_eq!(told(&hook, SpaceKind::Free), [true; 4]);
+        assert_eq!(evident_among(&hook, SpaceKind::Free), [true; 4]);
     }
 
     #[test]
@@ -245,25 +247,25 @@ mod tests {
         let noise = |i: usize| [0.003, -0.002, 0.001, -0.003][i % 4];
         let wire: Vec<[f32; 3]> =
             (0..9).map(|i| [noise(i), noise(i + 1), 0.04 * i as f32 - 0.16]).collect();
-        assert_eq!(told(&wire, SpaceKind::Free), [true; 9]);
+        assert_eq!(evident_among(&wire, SpaceKind::Free), [true; 9]);
     }
 
     #[test]
-    fn of_what_hangs_strays_and_curtains_are_left_out() {
+    fn stray_points_are_not_attached() {
         let hose = (0..40).map(|i| ([0.01 * i as f32, 0.0, 0.0], i % 5 == 0));
         let curtain = (0..20).map(|i| ([0.0, 0.3, 0.01 * i as f32], true));
         let all: Vec<_> = hose.chain(curtain).chain([([0.0, -0.4, 0.0], false)]).collect();
-        let left = hanging(&all);
+        let left = attached_points(&all);
         assert_eq!(left, all[..40].iter().map(|(p, _)| *p).collect::<Vec<_>>());
     }
 
     #[test]
-    fn what_grazing_beams_told_stands_only_where_others_tell_a_surface() {
+    fn points_of_grazing_beams_count_only_on_surfaces_of_others() {
         let curtain: Vec<[f32; 3]> = (0..30).map(|i| [0.0, 0.0, 0.01 * i as f32]).collect();
-        assert_eq!(told_by(&curtain, SpaceKind::Free, true), [false; 30]);
-        assert_eq!(told_by(&curtain, SpaceKind::Unknown, true), [false; 30]);
+        assert_eq!(evident_by(&curtain, SpaceKind::Free, true), [false; 30]);
+        assert_eq!(evident_by(&curtain, SpaceKind::Unknown, true), [false; 30]);
         // Points at the wall belong to the wall.
         let at_wall = [[0.99, 0.2, 0.2], [1.01, 0.305, 0.1]];
-        assert_eq!(told_by(&at_wall, SpaceKind::Free, true), [true; 2]);
+        assert_eq!(evident_by(&at_wall, SpaceKind::Free, true), [true; 2]);
     }
 }

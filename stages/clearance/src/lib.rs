@@ -6,7 +6,9 @@
 //!
 //! # Example
 //! ```
-//! use clearance::{Cells, Contacts, KnownBounds, Obstacles, PathWalk, RobotBody, What, leg, reach};
+//! use clearance::{
+//!     Cells, Contacts, KnownBounds, ObstacleKind, Obstacles, PathWalk, RobotBody, leg, reach,
+//! };
 //! use geometry::{Aabb, Pose};
 //! # let folder = tempfile::tempdir()?;
 //! # let beam = "<origin xyz='0.5 0 0'/><geometry><box size='1 0.1 0.1'/></geometry>";
@@ -17,24 +19,26 @@
 //! let model = robot::Model::load(folder.path(), &robot::Settings::default())?.0; // 1 m about z
 //! let (margin, found) = (0.02, vec![0.0]);
 //! let mut cells = Cells::within(reach(&model) + margin, &Default::default());
-//! (0..40).for_each(|i| cells.add([0.0, 0.9, 0.01 * f64::from(i - 20)], What::Fixed, false, 0));
-//! cells.settle();
+//! let post = (0..40).map(|i| [0.0, 0.9, 0.01 * f64::from(i - 20)]);
+//! post.for_each(|p| cells.add(p, ObstacleKind::Fixed, false, 0));
+//! cells.remove_duplicates();
 //! let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
 //! let known = KnownBounds { world_from_base: Pose::identity(), bounds };
 //! let mut around = Obstacles::new(&cells, &[], None, known);
 //! let mut body = RobotBody::new(&model, Default::default(), margin, 0.0, &contract::OneByOne);
-//! body.stand(&found, &mut around);
+//! body.remove_robot(&found, &mut around);
 //! let path = [found.clone(), vec![2.0]]; // the beam turns past a post at 90°
 //! let legs = [leg(&body, &path[0], &path[1])];
 //! let walk = PathWalk::new(&body, &around, &path, &legs, &found);
 //! let mut contacts = Contacts::default();
-//! (0..walk.n_pieces()).for_each(|piece| walk.add(walk.look(piece), &mut contacts));
-//! assert_eq!(contacts.all()[0].what, What::Fixed);
+//! (0..walk.n_pieces()).for_each(|piece| walk.add(walk.examine(piece), &mut contacts));
+//! assert_eq!(contacts.all()[0].what, ObstacleKind::Fixed);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
 
 mod body;
+mod contact_level;
 mod evidence;
 mod obstacle;
 mod obstacles;
@@ -42,22 +46,10 @@ mod path;
 mod shadow;
 mod shape;
 
-pub use body::{Hung, RobotBody, STEP, reach};
-pub use evidence::hanging;
-pub use obstacle::{CELL, What};
+pub use body::{AttachedPoints, RobotBody, STEP, reach};
+pub use contact_level::ContactLevel;
+pub use evidence::attached_points;
+pub use obstacle::{CELL, ObstacleKind};
 pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles};
 pub use path::{Contact, Contacts, Leg, PathWalk, PieceContacts, leg};
 pub use shadow::{ScannerAt, Shadow};
-
-/// How close a part of a robot is to an obstacle; a greater level is worse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ContactLevel {
-    /// The part reaches into space that no beam passed through.
-    Unseen,
-    /// The obstacle is nearer than the margin.
-    Near,
-    /// The obstacle touches the surface of the part.
-    Hit,
-    /// The obstacle lies inside the part.
-    Inside,
-}

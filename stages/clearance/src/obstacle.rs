@@ -1,38 +1,38 @@
-//! What one obstacle is: a ball about a cell of points or a voxel of unseen space, and how far
-//! balls are from each other. All in the frame of the robot's base, metres.
+//! One obstacle: a ball around a cell of points or around a voxel of unseen space. All coordinates
+//! are in the frame of the robot's base, metres.
 
-/// Edge of the cells in which all points are one obstacle, metres: finer than planners' margins,
-/// and the floor of a cell in such cells fits into memory.
+/// Edge of the cells in which all points make one obstacle, metres: finer than the margins of
+/// motion planners, and coarse enough that a robot cell's floor fits into memory.
 pub const CELL: f64 = 0.004;
 /// Half the diagonal of a cube of edge 1.
 pub(crate) const HALF_DIAGONAL: f64 = 0.8661;
 /// Radius of a ball that holds a cell, metres.
 pub(crate) const HALF_CELL: f32 = (HALF_DIAGONAL * CELL) as f32;
 
-/// What an obstacle is.
+/// The kind of an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum What {
-    /// Points that stand still.
+pub enum ObstacleKind {
+    /// Points that do not move.
     Fixed,
     /// Points of the floor.
     Floor,
-    /// Points of which nobody knows.
+    /// Points with the label uncertain.
     Uncertain,
-    /// Those of them beside where the robot stood when it was scanned: most are its own.
+    /// Uncertain points beside the robot as it was scanned. Most of them belong to it.
     Beside,
-    /// Points and surface of the robot with this number.
+    /// The robot with this index in the result: its points and the surface of its model.
     Robot(i16),
-    /// Space that no beam went through.
+    /// Space that no beam passed through.
     Unseen,
 }
 
-/// A ball.
+/// An obstacle: a ball.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Obstacle {
     pub(crate) at: [f32; 3],
     pub(crate) radius: f32,
-    pub(crate) what: What,
-    /// All beams that tell it grazed the edge of a robot (see [`crate::Shadow`]).
+    pub(crate) what: ObstacleKind,
+    /// Whether all beams that measured it grazed the edge of a robot (see [`crate::Shadow`]).
     pub(crate) is_grazed: bool,
 }
 

@@ -2,7 +2,7 @@
 //! coordinates are in the frame of the robot's base, metres.
 
 use crate::evidence::evident;
-use crate::obstacle::{CELL, HALF_CELL, HALF_DIAGONAL, Obstacle, What, distance};
+use crate::obstacle::{CELL, HALF_CELL, HALF_DIAGONAL, Obstacle, ObstacleKind, distance};
 use crate::shadow::{Front, ScannerAt};
 use contract::{Space, SpaceKind};
 use geometry::{Aabb, Point, Pose, Vector};
@@ -15,7 +15,7 @@ use std::ops::Range;
 const BIN: f64 = 0.16;
 /// Number of bits of a cell's position along each axis.
 const BITS: u32 = 20;
-/// Largest distance from a base at which points can be told apart, metres: 2 km.
+/// Largest distance from a base at which the cells of points are distinct, metres: 2 km.
 pub const FARTHEST: f64 = 0.5 * CELL * (1_u32 << BITS) as f64;
 
 /// Neighbouring obstacles.
@@ -34,7 +34,7 @@ pub struct Cells {
     far: f64,
     /// Position, kind, whether the beam grazed the edge of a robot, and `point_source_id` of the
     /// scanner.
-    cells: Vec<(u64, What, bool, u16)>,
+    cells: Vec<(u64, ObstacleKind, bool, u16)>,
     /// Nearest measurements of each scanner, whatever they belong to, by `point_source_id`.
     fronts: BTreeMap<u16, Front>,
 }
@@ -86,7 +86,7 @@ impl Cells {
     }
 
     /// Records that a scanner measured a point (base frame, at most `far` away), whatever it is.
-    pub fn see(&mut self, p: &Point, source: u16) {
+    pub fn add_measurement(&mut self, p: &Point, source: u16) {
         if let Some(front) = self.fronts.get_mut(&source) {
             front.add(p);
         }
@@ -94,7 +94,7 @@ impl Cells {
 
     /// Adds a point (base frame, at most `far` away) with whether its beam grazed the edge of a
     /// robot, and the `point_source_id` of its scanner.
-    pub fn add(&mut self, p: [f64; 3], what: What, is_grazed: bool, source: u16) {
+    pub fn add(&mut self, p: [f64; 3], what: ObstacleKind, is_grazed: bool, source: u16) {
         let most = f64::from((1_u32 << BITS) - 1);
         let place = |i: usize| ((p[i] + self.far) / CELL).clamp(0.0, most) as u64;
         self.cells.push((
@@ -106,12 +106,13 @@ impl Cells {
     }
 
     /// Removes duplicate cells. Call it after each tile, so that only distinct cells take memory.
-    pub fn settle(&mut self) {
+    pub fn remove_duplicates(&mut self) {
         self.cells.sort_unstable();
         self.cells.dedup();
     }
 
-    /// Adds the cells of another part of the same surroundings; call [`Cells::settle`] at the end.
+    /// Adds the cells of another part of the same surroundings. Call [`Cells::remove_duplicates`]
+    /// at the end.
     pub fn join(&mut self, other: Self) {
         self.cells.extend(other.cells);
         for (source, front) in other.fronts {
@@ -125,7 +126,7 @@ impl Cells {
     fn obstacles(&self) -> Vec<Obstacle> {
         let mask = (1_u64 << BITS) - 1;
         let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
-        let obstacle = |alike: &[(u64, What, bool, u16)]| {
+        let obstacle = |alike: &[(u64, ObstacleKind, bool, u16)]| {
             let (key, what, ..) = alike[0];
             let is_grazed = alike.iter().all(|cell| cell.2);
             let cell = [key >> (2 * BITS), key >> BITS & mask, key & mask];
@@ -138,14 +139,15 @@ impl Cells {
 
 impl Cells {
     /// For each obstacle, whether neighbouring beams hit something in front of it, according to all
-    /// scanners that measured it; only computed where `asks` holds.
-    fn behind(&self, all: &[Obstacle], asks: impl Fn(usize) -> bool) -> Vec<bool> {
+    /// scanners that measured it. It is only computed where `is_needed` holds, and `false`
+    /// elsewhere.
+    fn behind(&self, all: &[Obstacle], is_needed: impl Fn(usize) -> bool) -> Vec<bool> {
         let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
-        let is_behind = |(at, alike): (usize, &[(u64, What, bool, u16)])| {
+        let is_behind = |(at, alike): (usize, &[(u64, ObstacleKind, bool, u16)])| {
             let p = Point::from(all[at].at.map(f64::from));
             let by = |source: u16| self.fronts.get(&source).is_some_and(|f| f.is_behind(&p));
             // Beams that grazed a robot are no evidence.
-            asks(at) && alike.iter().filter(|cell| !cell.2).all(|cell| by(cell.3))
+            is_needed(at) && alike.iter().filter(|cell| !cell.2).all(|cell| by(cell.3))
         };
         alike.enumerate().map(is_behind).collect()
     }
@@ -164,8 +166,8 @@ impl Obstacles {
         let mut all: Vec<Obstacle> = cells.obstacles();
         let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);
         let is_evident = evident(&mut all, behind, space, &known.world_from_base);
-        let mut told = is_evident.into_iter();
-        all.retain(|_| told.next().unwrap_or(true));
+        let mut evident = is_evident.into_iter();
+        all.retain(|_| evident.next().unwrap_or(true));
         for (number, model, poses) in others {
             all.extend(surface(*number, model, poses));
         }
@@ -182,7 +184,7 @@ impl Obstacles {
 
     /// An index of the fixed obstacles for queries within `within` metres.
     pub(crate) fn fixed(&self, within: f32) -> Fixed {
-        let of = |o: &&Obstacle| o.what == What::Fixed;
+        let of = |o: &&Obstacle| o.what == ObstacleKind::Fixed;
         let mut cubes: FxHashMap<[i32; 3], Vec<[f32; 3]>> = FxHashMap::default();
         for o in self.all.iter().filter(of) {
             cubes.entry(o.at.map(|v| (v / within).floor() as i32)).or_default().push(o.at);
@@ -223,7 +225,7 @@ impl Obstacles {
 
     /// Whether a box of a link extends beyond the volume in which points were collected, or beyond
     /// the known space.
-    pub(crate) fn leaves(&self, bounds: &Aabb, base_from_link: &Pose) -> bool {
+    pub(crate) fn reaches_unknown(&self, bounds: &Aabb, base_from_link: &Pose) -> bool {
         let pose = self.known.world_from_base * base_from_link;
         let is_known = |c: [f64; 3]| {
             let (here, world) = (base_from_link * Point::from(c), pose * Point::from(c));
@@ -273,7 +275,7 @@ fn surface<'a>(
         link.cad.points.iter().map(move |p| {
             let at = pose * Point::from(p.map(f64::from));
             let at = at.coords.map(|v| v as f32).into();
-            Obstacle { at, radius, what: What::Robot(number), is_grazed: false }
+            Obstacle { at, radius, what: ObstacleKind::Robot(number), is_grazed: false }
         })
     })
 }
@@ -295,14 +297,14 @@ impl Split {
         Self { offsets, radius: (HALF_DIAGONAL * step) as f32 }
     }
 
-    /// Whether nothing is known of space.
+    /// Whether there is no known space.
     pub(crate) fn is_empty(&self) -> bool {
         self.offsets.is_empty()
     }
 
     /// The parts of a voxel of unseen space; `None` for other obstacles, and for parts themselves.
     pub(crate) fn parts(&self, o: &Obstacle) -> Option<impl Iterator<Item = Obstacle> + '_> {
-        let is_whole = o.what == What::Unseen && o.radius > 1.5 * self.radius;
+        let is_whole = o.what == ObstacleKind::Unseen && o.radius > 1.5 * self.radius;
         let (middle, what, radius) = (o.at, o.what, self.radius);
         is_whole.then(|| {
             self.offsets.iter().map(move |by| Obstacle {
@@ -327,7 +329,7 @@ fn unseen(space: &Space, base_from_world: &Pose) -> impl Iterator<Item = Obstacl
         Obstacle {
             at,
             radius: (HALF_DIAGONAL * grid.edge) as f32,
-            what: What::Unseen,
+            what: ObstacleKind::Unseen,
             is_grazed: false,
         }
     })

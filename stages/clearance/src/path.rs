@@ -1,9 +1,9 @@
-//! Walks along a path in postures so close that nothing is missed between them, and reports where
-//! on the path which part is near which obstacle.
+//! Examines postures along a path, so close to each other that no contact is missed between them,
+//! and reports where on the path which part is near which obstacle.
 
-use crate::ContactLevel;
 use crate::body::{PartTouch, PostureNear, RobotBody, STEP};
-use crate::obstacle::What;
+use crate::contact_level::ContactLevel;
+use crate::obstacle::ObstacleKind;
 use crate::obstacles::Obstacles;
 use geometry::Point;
 use std::collections::BTreeMap;
@@ -31,11 +31,11 @@ pub struct Contact {
     /// Index of the link.
     pub link: usize,
     /// Whether points attached to the link are near, and not the link itself.
-    pub hangs: bool,
+    pub is_attached: bool,
     /// Whether it is uncertain that these points are attached to the link.
     pub is_doubtful: bool,
     /// The kind of the obstacle.
-    pub what: What,
+    pub what: ObstacleKind,
     /// The worst level on the stretch.
     pub level: ContactLevel,
     /// Whether the part was as near to these obstacles in the posture in which it was scanned.
@@ -66,7 +66,7 @@ impl Contact {
 }
 
 /// Index of the part, kind of the obstacle, and whether it was as near when scanned.
-type ContactKey = (usize, What, bool);
+type ContactKey = (usize, ObstacleKind, bool);
 
 /// A path that is examined piece by piece.
 pub struct PathWalk<'a> {
@@ -114,9 +114,9 @@ impl<'a> PathWalk<'a> {
 
     /// Examines a piece, independently of all others.
     #[must_use]
-    pub fn look(&self, piece: usize) -> PieceContacts {
+    pub fn examine(&self, piece: usize) -> PieceContacts {
         let own = piece * PIECE..((piece + 1) * PIECE).min(self.n_postures());
-        let look = |at: usize| {
+        let examine = |at: usize| {
             let leg = self.first.partition_point(|first| *first <= at) - 1;
             let share = self
                 .legs
@@ -126,15 +126,15 @@ impl<'a> PathWalk<'a> {
             let posture = between(from, self.path.get(leg + 1).unwrap_or(from), share);
             let near = self.body.near(&posture, self.around);
             let open = self.body.model.loop_gap(&posture);
-            (leg as f64 + share, told(&near, &self.found, self.around), open)
+            (leg as f64 + share, contacts_of_posture(&near, &self.found, self.around), open)
         };
-        PieceContacts(own.map(look).collect())
+        PieceContacts(own.map(examine).collect())
     }
 
     /// Adds the contacts of the next piece.
-    pub fn add(&self, looked: PieceContacts, to: &mut Contacts) {
-        for (place, told, open) in looked.0 {
-            to.add(self.body, self.around, place, told);
+    pub fn add(&self, examined: PieceContacts, to: &mut Contacts) {
+        for (place, contacts, open) in examined.0 {
+            to.add(self.body, self.around, place, contacts);
             if open > to.open.1 {
                 to.open = (place, open);
             }
@@ -218,7 +218,7 @@ impl AsFound {
 /// index of the obstacle, number of obstacles.
 type PostureContacts = BTreeMap<ContactKey, (ContactLevel, f32, Option<usize>, usize)>;
 
-fn told(near: &PostureNear, found: &AsFound, around: &Obstacles) -> PostureContacts {
+fn contacts_of_posture(near: &PostureNear, found: &AsFound, around: &Obstacles) -> PostureContacts {
     let mut out = PostureContacts::new();
     for touch in &near.touches {
         let key = (touch.part, around.all[touch.obstacle].what, found.is(touch));
@@ -229,7 +229,7 @@ fn told(near: &PostureNear, found: &AsFound, around: &Obstacles) -> PostureConta
         worst.3 += 1;
     }
     for &part in &near.outside {
-        let key = (part, What::Unseen, found.outside.contains(&part));
+        let key = (part, ObstacleKind::Unseen, found.outside.contains(&part));
         out.entry(key).or_insert((ContactLevel::Unseen, 0.0, None, 0));
     }
     out
@@ -244,12 +244,18 @@ pub struct Contacts {
 }
 
 impl Contacts {
-    fn add(&mut self, body: &RobotBody<'_>, around: &Obstacles, place: f64, told: PostureContacts) {
-        for (key, (level, gap, obstacle, n)) in told {
+    fn add(
+        &mut self,
+        body: &RobotBody<'_>,
+        around: &Obstacles,
+        place: f64,
+        contacts: PostureContacts,
+    ) {
+        for (key, (level, gap, obstacle, n)) in contacts {
             let part = &body.parts[key.0];
             let now = Contact {
                 link: part.link,
-                hangs: part.hangs,
+                is_attached: part.is_attached,
                 is_doubtful: part.is_doubtful,
                 what: key.1,
                 level,

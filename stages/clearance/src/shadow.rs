@@ -58,9 +58,9 @@ impl Shadow {
         if far < GRAZE {
             return;
         }
-        let (way, rim) = (off / far, (GRAZE + 0.5 * SPACING) / far);
+        let (direction, rim) = (off / far, (GRAZE + 0.5 * SPACING) / far);
         let n = (rim / self.width).ceil() as i32;
-        let middle = self.cell(way.into());
+        let middle = self.cell(direction.into());
         let side = 2 * n + 1;
         for i in 0..side.pow(3) {
             let by = [i % side - n, i / side % side - n, i / (side * side) - n];
@@ -71,17 +71,17 @@ impl Shadow {
             if (length - 1.0).abs() > self.width {
                 continue;
             }
-            let aside = (0..3).map(|k| (at[k] / length - way[k]).powi(2)).sum::<f64>().sqrt();
+            let aside = (0..3).map(|k| (at[k] / length - direction[k]).powi(2)).sum::<f64>().sqrt();
             if aside <= rim + self.width {
-                let told = (far + ASIDE * far * aside) as f32;
-                let near = self.near.entry(cell).or_insert(told);
-                *near = near.min(told);
+                let distance = (far + ASIDE * far * aside) as f32;
+                let near = self.near.entry(cell).or_insert(distance);
+                *near = near.min(distance);
             }
         }
     }
 
-    fn cell(&self, way: [f64; 3]) -> [i32; 3] {
-        way.map(|v| (v / self.width).floor() as i32)
+    fn cell(&self, direction: [f64; 3]) -> [i32; 3] {
+        direction.map(|v| (v / self.width).floor() as i32)
     }
 
     /// Whether the beam to a point may have hit an edge in front of it.
@@ -115,7 +115,7 @@ pub(crate) struct Front {
 const BEAM: f64 = 1e-3;
 /// A point that is nearer by less belongs to the same object, metres: noise, and surfaces seen at
 /// an angle.
-const BEFORE: f32 = 0.02;
+const MIN_DEPTH: f32 = 0.02;
 
 impl Front {
     pub(crate) fn new(eye: &ScannerAt) -> Self {
@@ -147,7 +147,7 @@ impl Front {
     pub(crate) fn is_behind(&self, p: &Point) -> bool {
         let ([x, y, z], far) = self.cell(p);
         let beside = |i: i32| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
-        (0..27).any(|i| self.near.get(&beside(i)).is_some_and(|near| near + BEFORE < far))
+        (0..27).any(|i| self.near.get(&beside(i)).is_some_and(|near| near + MIN_DEPTH < far))
     }
 }
 
@@ -169,22 +169,22 @@ mod tests {
         for far in [1.0, 3.0, 9.0] {
             let shadow = Shadow::new(&[(&model, &poses)], Point::new(-far, 0.0, 0.5));
             // By distance beside the outline and behind the axis of the post.
-            let told = |aside: f64, behind: f64| {
+            let is_behind_at = |aside: f64, behind: f64| {
                 let wide = (0.1 + aside) * (far + behind) / far;
                 [-wide, wide].map(|y| shadow.is_grazed(&Point::new(behind, y, 0.5)))
             };
             for behind in [0.08, 0.3, 2.0] {
-                assert_eq!(told(0.003, behind), [true; 2], "{far} {behind}");
+                assert_eq!(is_behind_at(0.003, behind), [true; 2], "{far} {behind}");
             }
             // Beside the post, away from it, and in front of it.
-            assert_eq!(told(0.02, 0.0), [false; 2], "{far}");
-            assert_eq!(told(0.06, 1.0), [false; 2], "{far}");
+            assert_eq!(is_behind_at(0.02, 0.0), [false; 2], "{far}");
+            assert_eq!(is_behind_at(0.06, 1.0), [false; 2], "{far}");
             assert!(!shadow.is_grazed(&Point::new(-0.4, 0.0, 0.5)), "{far}");
         }
     }
 
     #[test]
-    fn what_beams_met_before_is_told_beside_it_and_no_farther() {
+    fn points_just_beside_a_nearer_surface_are_behind_it() {
         let mut front = Front::new(&ScannerAt { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
         // A wire 2 m away.
         (0..100).for_each(|i| front.add(&Point::new(2.0, 0.0, 0.5 + 0.006 * f64::from(i))));

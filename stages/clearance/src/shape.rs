@@ -16,9 +16,9 @@ const N_INSIDE: f64 = 4e6;
 /// Diagonal of a cube of edge 1.
 const DIAGONAL: f64 = 1.7321;
 /// Edge of the voxels that give the nearest attached point, metres.
-const HUNG_EDGE: f32 = 0.01;
+const ATTACHED_EDGE: f32 = 0.01;
 /// Further reach of these voxels, metres: their own diagonal, even where they had to be widened.
-const HUNG_REACH: f32 = 0.1;
+const ATTACHED_REACH: f32 = 0.1;
 
 /// The distance of a place from a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ pub(crate) enum PartShape {
     /// Triangles, and the voxels that they enclose.
     Surface(Box<TriMesh>, Space),
     /// Attached points, with an index of the nearest one.
-    Hung(Vec<[f32; 3]>, NearestField),
+    Attached(Vec<[f32; 3]>, NearestField),
 }
 
 impl PartShape {
@@ -53,9 +53,9 @@ impl PartShape {
     }
 
     /// A shape of attached points for queries of at most `most` metres.
-    pub(crate) fn hung(points: Vec<[f32; 3]>, most: f32) -> Self {
-        let field = NearestField::new(&points, HUNG_EDGE, most + HUNG_REACH);
-        Self::Hung(points, field)
+    pub(crate) fn attached(points: Vec<[f32; 3]>, most: f32) -> Self {
+        let field = NearestField::new(&points, ATTACHED_EDGE, most + ATTACHED_REACH);
+        Self::Attached(points, field)
     }
 
     /// Distance of a place, if it is at most `within` metres. Enclosed places are inside, however
@@ -68,7 +68,7 @@ impl PartShape {
                 let found = CompositeShapeRef(&**mesh).project_local_point(at, within, false);
                 found.map_or(Gap::Far, |(_, there)| Gap::At((there.point - at).length()))
             }
-            Self::Hung(points, field) => match field.nearest(p) {
+            Self::Attached(points, field) => match field.nearest(p) {
                 Some(i) => {
                     // The point nearest to the centre of the voxel may be farther by the diagonal,
                     // and each point stands for a cell.
@@ -81,8 +81,9 @@ impl PartShape {
         }
     }
 
-    /// Whether it gives distances without limit.
-    pub(crate) fn tells_all(&self) -> bool {
+    /// Whether it gives distances at any range. Attached points give them only up to the limit they
+    /// were prepared for.
+    pub(crate) fn is_unlimited(&self) -> bool {
         matches!(self, Self::Surface(..))
     }
 }
@@ -167,9 +168,9 @@ mod tests {
     }
 
     #[test]
-    fn points_that_hang_are_never_farther_than_they_are() {
+    fn distances_from_attached_points_are_lower_bounds() {
         let points: Vec<[f32; 3]> = (0..200).map(|i| [0.003 * i as f32, 0.0, 0.0]).collect();
-        let shape = PartShape::hung(points, 0.05);
+        let shape = PartShape::attached(points, 0.05);
         for k in 0..100 {
             let off = 0.0005 * k as f32;
             match shape.gap([0.2, off, 0.0], 0.05) {

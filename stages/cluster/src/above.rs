@@ -1,6 +1,7 @@
 //! Selects the occupied voxels above the floor.
 
-use crate::{Counted, Settings};
+use crate::connect::Counted;
+use crate::settings::Settings;
 use contract::{Floor, FloorLevel, Occupancy};
 
 /// The voxels whose bottom lies above the floor, in their order.

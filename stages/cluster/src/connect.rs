@@ -1,7 +1,10 @@
 //! Finds connected sets of sorted voxels. Rows are cut into runs and neighbouring runs are joined,
 //! so that the work is linear in the number of voxels.
 
-use crate::Counted;
+use contract::Voxel;
+
+/// A voxel with the number of points in it.
+pub(crate) type Counted = (Voxel, u32);
 
 /// Consecutive voxels of one row, with small gaps bridged.
 struct VoxelRun {
@@ -27,7 +30,7 @@ pub(crate) fn connect(voxels: &[Counted], gap: i32) -> Vec<u32> {
         for dy in -reach..=reach {
             // Only earlier rows, so that each pair of rows is visited once.
             if (dz, dy) < (0, 0) {
-                join_rows(&rows, &runs, (dz, dy), reach, &mut parent);
+                join_rows(&rows, &runs, RowOffset { dz, dy }, reach, &mut parent);
             }
         }
     }
@@ -68,18 +71,25 @@ fn cut(voxels: &[Counted], reach: i32) -> (Vec<RowOfVoxels>, Vec<VoxelRun>, Vec<
     (rows, runs, run_of)
 }
 
-/// Joins runs of each row with those of the row that lies `(dz, dy)` from it.
+/// Position of one row relative to another, voxels.
+#[derive(Debug, Clone, Copy)]
+struct RowOffset {
+    dz: i32,
+    dy: i32,
+}
+
+/// Joins runs of each row with those of the row at an offset from it.
 fn join_rows(
     rows: &[RowOfVoxels],
     runs: &[VoxelRun],
-    (dz, dy): (i32, i32),
+    offset: RowOffset,
     reach: i32,
     parent: &mut [u32],
 ) {
     // Both sequences of rows are sorted and walked through once.
     let mut other = 0;
     for row in rows {
-        let wanted = (row.z.saturating_add(dz), row.y.saturating_add(dy));
+        let wanted = (row.z.saturating_add(offset.dz), row.y.saturating_add(offset.dy));
         while other < rows.len() && (rows[other].z, rows[other].y) < wanted {
             other += 1;
         }

@@ -19,30 +19,12 @@
 
 mod above;
 mod connect;
+mod settings;
 
-use contract::{Cluster, Floor, Occupancy, Voxel};
+pub use settings::Settings;
+
+use contract::{Cluster, Floor, Occupancy};
 use geometry::Aabb;
-
-/// Settings of the cluster stage.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
-    /// Number of empty voxels that a cluster may bridge. The default of 1 allows for the holes
-    /// that thin and distant parts have at 5 cm.
-    pub gap: i32,
-    /// Smallest height of a voxel's bottom above the floor, metres; the default is three times the
-    /// noise of a common scanner.
-    pub clearance: f64,
-    /// Depth below a level down to which a voxel counts as noise or dirt of that level, metres.
-    pub slack: f64,
-    /// Smallest number of points of a cluster; fewer are dust.
-    pub min_points: u64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { gap: 1, clearance: 0.012, slack: 0.15, min_points: 10 }
-    }
-}
 
 /// Splits the occupied space above the floor into clusters, most points first. Where no floor is
 /// known, all of the occupied space is used.
@@ -78,9 +60,6 @@ pub fn split(occupancy: &Occupancy, floor: &Floor, settings: &Settings) -> Vec<C
     }
     clusters
 }
-
-/// A voxel with the number of points in it.
-type Counted = (Voxel, u32);
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,8 @@
 //! Clusters of small scenes of voxels.
 
 use super::*;
-use contract::FloorLevel;
+use crate::connect::Counted;
+use contract::{FloorLevel, Voxel};
 use geometry::{Plane, Vector};
 
 fn occupancy(mut voxels: Vec<Voxel>) -> Occupancy {

@@ -1,5 +1,5 @@
-//! A cluster is a connected body above the floor; a candidate is a robot model with the place and
-//! the base poses at which it is worth fitting.
+//! Clusters (connected bodies above the floor) and candidates (a robot model with a place and the
+//! base poses at which it is worth fitting).
 
 use crate::InstallationPlane;
 use geometry::{Aabb, Pose};

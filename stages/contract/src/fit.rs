@@ -38,12 +38,12 @@ pub struct JointFit {
     pub name: String,
     /// Value, radians; metres for prismatic joints.
     pub value: f64,
-    /// Standard deviation in the same unit. Where the points say nothing of a revolute joint it is
+    /// Standard deviation in the same unit. If the points do not determine a revolute joint, it is
     /// that of a uniform angle, π/√3.
     pub sigma: f64,
     /// How well the points determine the value.
     pub certainty: Certainty,
-    /// Other values within the limits at which the robot stands the same, whole turns away.
+    /// Other values within the limits, whole turns away, at which the posture is the same.
     pub equivalents: Vec<f64>,
 }
 
@@ -55,7 +55,7 @@ impl JointFit {
     }
 }
 
-/// What the scans say of one link in the fitted posture.
+/// The evidence of the scans for one link in the fitted posture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinkEvidence {
     /// Name of the link in the URDF.
@@ -190,7 +190,7 @@ impl JointFrame {
     }
 }
 
-/// How a robot differs from its model, as far as its points can tell.
+/// The differences of a robot from its model, as its points determine them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// The frames of the free joints, in the order of the model.
@@ -230,14 +230,14 @@ pub struct Fit {
     pub surface_sigma: f64,
     /// Standard deviation of the position of the main chain's tip in the base frame, metres.
     pub tip_sigma: f64,
-    /// Errors of the scans' stated poses, as far as the points of the robot tell.
+    /// Errors of the scans' stated poses, as the points of the robot determine them.
     pub scans: Vec<ScanShift>,
     /// The robot's part in the joint estimate of these errors; `None` where a scanner's position
     /// is unknown.
     pub share: Option<ScanShare>,
     /// Evidence for each link of the model, in the order of the model.
     pub links: Vec<LinkEvidence>,
-    /// Scans in which the robot stands so; empty if it stands so in all scans.
+    /// Scans in which the robot has this posture; empty if it has it in all scans.
     pub stands_in: Vec<crate::ScanId>,
     /// Its postures in the other scans, if it moved between scans.
     pub stays: Vec<Fit>,
@@ -263,8 +263,8 @@ pub struct Fit {
     pub verdict: Verdict,
     /// Reasons for the verdict, in words; empty only for a trusted fit without remarks.
     pub reasons: Vec<String>,
-    /// Whether it gives no labels although it is not refused, in a run that knows better where its
-    /// points are: kept within the run, and not in files.
+    /// Whether the fit gives no labels although it is not refused, because a later step of the same
+    /// run explains its points better. Not part of any file.
     #[serde(skip)]
     pub is_without_labels: bool,
 }

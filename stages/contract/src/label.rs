@@ -4,11 +4,11 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum PointKind {
-    /// Something that stands still.
+    /// An object that does not move.
     Fixed = 0,
     /// A link of a robot, its foot included.
     Link = 1,
-    /// What moves with a robot and is not in its model: attachment, tool or carried part.
+    /// An object that moves with a robot and is not in its model: attachment, tool or carried part.
     Attachment = 2,
     /// Floor.
     Floor = 3,

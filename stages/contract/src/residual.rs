@@ -33,7 +33,7 @@ pub struct ResidualVoxel {
     pub distance: f32,
     /// Whether it lies at the border of the region, so that its body may continue outside.
     pub at_border: bool,
-    /// Whether it stands on the floor.
+    /// Whether the voxel stands on the floor.
     pub grounded: bool,
 }
 
@@ -89,7 +89,7 @@ pub struct PlaceRun<T> {
     pub first: u64,
     /// Number of places.
     pub n: u32,
-    /// The value of all of them.
+    /// The value at each of these places.
     pub what: T,
 }
 

@@ -35,7 +35,7 @@ impl AtomicFile {
         let path = path.into();
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)
-                .map_err(|e| Error::of_file("folder cannot be made", folder, e))?;
+                .map_err(|e| Error::of_file("folder cannot be created", folder, e))?;
         }
         let part = part_of(&path);
         let file = OpenOptions::new()
@@ -44,7 +44,7 @@ impl AtomicFile {
             .write(true)
             .truncate(true)
             .open(&part)
-            .map_err(|e| Error::of_file("file cannot be made", &part, e))?;
+            .map_err(|e| Error::of_file("file cannot be created", &part, e))?;
         let (file, waiting) = (Some(file), AlignedBlock::default());
         Ok(Self { file, part, path, waiting, direct: None })
     }

@@ -38,13 +38,13 @@ pub fn link_color(link: usize) -> Rgb {
     COLORS[link % COLORS.len()]
 }
 
-/// Most pixels along a side: ten times what any picture here has.
+/// Limit of the pixels along a side: ten times the size of the pictures of this program.
 const MAX_SIDE: usize = 30_000;
 
 /// A picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canvas {
-    /// All of it opaque.
+    /// The pixels, all of them opaque.
     pixels: Pixmap,
 }
 
@@ -98,7 +98,7 @@ impl Canvas {
         }
     }
 
-    /// Fills a disc about the middle of a pixel; `radius` in pixels.
+    /// Fills a disc around the centre of a pixel; `radius` in pixels.
     pub fn disc(&mut self, x: i64, y: i64, radius: i64, color: Rgb) {
         let middle = [x, y].map(|v| v as f32 + 0.5);
         let Some(circle) = PathBuilder::from_circle(middle[0], middle[1], radius as f32 + 0.5)
@@ -110,7 +110,7 @@ impl Canvas {
         self.pixels.fill_path(&circle, &paint, FillRule::Winding, Transform::identity(), None);
     }
 
-    /// Writes words on a white ground, with the left upper corner of the first capital letter at
+    /// Writes text on a white background. The upper left corner of the first capital letter is at
     /// (`x`, `y`).
     pub fn text(&mut self, x: i64, y: i64, size: TextSize, color: Rgb, words: &str) {
         let (width, capitals) = (Self::text_width(size, words), size.capitals().ceil() as i64);
@@ -128,13 +128,12 @@ impl Canvas {
         }
     }
 
-    /// Writes text, `size` times 8 pixels high, on a white background. Characters that the font
-    /// lacks become question marks.
+    /// Writes text that ends at `x`, otherwise like [`Self::text`].
     pub(crate) fn text_to(&mut self, x: i64, y: i64, size: TextSize, color: Rgb, words: &str) {
         self.text(x - Self::text_width(size, words), y, size, color, words);
     }
 
-    /// How wide words are, pixels.
+    /// Width of text, pixels.
     #[must_use]
     pub fn text_width(size: TextSize, words: &str) -> i64 {
         font::width(size, words).ceil() as i64
@@ -154,7 +153,7 @@ impl Canvas {
     /// If the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
         let failed = |e: png::EncodingError| {
-            Error::new(Kind::Bug, "picture does not encode").because(e).at(path.display())
+            Error::new(Kind::Bug, "picture cannot be encoded as PNG").because(e).at(path.display())
         };
         let [width, height] = [self.pixels.width(), self.pixels.height()];
         let colors = |p: &PremultipliedColorU8| [p.red(), p.green(), p.blue()];

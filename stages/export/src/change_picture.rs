@@ -1,5 +1,5 @@
-//! Draws a cell that was scanned again, from above and from the side: what stands, what went and
-//! what appeared.
+//! Draws a cell that was scanned again, from above and from the side: unchanged, missing and new
+//! objects.
 
 use crate::canvas::{Canvas, INK, Rgb, blend};
 use crate::font::TextSize::Body;
@@ -12,7 +12,8 @@ const MARGIN: i64 = 30;
 /// Height above the bottom of the cell up to which things are drawn, metres; a ceiling would hide
 /// everything.
 const SHOWN: f64 = 3.0;
-/// What stands, what nobody looked at, what went, what came.
+/// Colours of unchanged places, of places that were not seen again, of missing objects and of new
+/// objects.
 const STANDS: Rgb = [150, 156, 164];
 const UNSEEN: Rgb = [240, 228, 66];
 const GONE: Rgb = [213, 94, 0];
@@ -21,7 +22,7 @@ const FILLED: Rgb = [0, 158, 115];
 /// A thing that changed between two sessions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChangedThing {
-    /// Its name with what happened to it.
+    /// Its name and how it changed.
     pub name: String,
     /// Places that are empty now, world, metres.
     pub gone: Vec<[f64; 3]>,
@@ -31,8 +32,9 @@ pub struct ChangedThing {
     pub at: [f64; 3],
 }
 
-/// Draws a cell: places where something stands, places where something stood that were not seen
-/// again, things that changed, and robots with the positions of their bases; world, metres.
+/// Draws a cell: occupied places, places that were occupied and not seen again, things that
+/// changed, and robots with the positions of their bases. All coordinates are in the world frame,
+/// metres.
 #[must_use]
 pub fn draw_changes(
     cell: &Aabb,
@@ -78,7 +80,7 @@ pub fn draw_changes(
         8,
         Body,
         INK,
-        "grey: stands   yellow: not seen again   orange: was there   green: is there now",
+        "grey: unchanged   yellow: not seen again   orange: missing now   green: new",
     );
     canvas
 }

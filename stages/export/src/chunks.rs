@@ -63,7 +63,7 @@ pub(crate) fn check(
         let most = if varying { chunk.point_count } else { u64::from(laz.chunk_size()) };
         let n = number::<4>(file, from + record_len as u64)?;
         if n != most.min(left) {
-            return Ok(Err(format!("a chunk states {n} points where {} are due", most.min(left))));
+            return Ok(Err(format!("a chunk states {n} points instead of {}", most.min(left))));
         }
         (from, left) = (from + n_bytes, left - n);
     }

@@ -26,7 +26,7 @@ const CREATED: (u64, [u8; 4]) = (90, [0; 4]);
 pub trait CopcSteps: Send + Sync {
     /// A step begins, with its total number of points or nodes.
     fn begins(&self, step: &'static str, total: u64);
-    /// Number of them that are done.
+    /// Number of tiles that are written.
     fn is_at(&self, done: u64);
     /// The step has ended; an error ends the conversion.
     ///
@@ -53,7 +53,7 @@ pub fn write_copc(
     let path = to.to_path_buf();
     let mut file = AtomicFile::create(&path)?;
     std::fs::create_dir_all(scratch)
-        .map_err(|e| Error::of_file("folder cannot be made", scratch, e))?;
+        .map_err(|e| Error::of_file("folder cannot be created", scratch, e))?;
     let config = PipelineConfig {
         memory_budget: BUDGET,
         temp_dir: Some(scratch.to_path_buf()),
@@ -110,7 +110,7 @@ fn failed(error: copc_converter::Error, path: &Path) -> Error {
         let io = number.unwrap_or_else(|| std::io::Error::new(io.kind(), format!("{causes:#}")));
         return Error::of_file("cloud cannot be written", path, io);
     }
-    Error::new(Kind::Bug, "the COPC file cannot be made").because(error).at(path.display())
+    Error::new(Kind::Bug, "COPC file cannot be created").because(error).at(path.display())
 }
 
 /// Forwards the progress of the conversion.

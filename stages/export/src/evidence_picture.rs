@@ -62,7 +62,7 @@ pub fn draw_evidence(title: &str, picture: &RobotPicture, fit: &Fit, model: &Mod
     canvas
 }
 
-/// The table of links: what the scans say of each.
+/// The table of links: the evidence of the scans for each.
 fn links(canvas: &mut Canvas, top: i64, fit: &Fit) {
     canvas.text(LINKS, top, Body, GREY, "link");
     for (head, right) in COLUMNS {

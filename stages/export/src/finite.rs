@@ -1,6 +1,6 @@
-//! A number in; what JSON can hold of it out.
+//! Converts numbers to what JSON can hold.
 
-/// The number where it is finite, else nothing: JSON has no word for the others.
+/// The number if it is finite, otherwise `None`: JSON has neither infinity nor NaN.
 pub(crate) fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

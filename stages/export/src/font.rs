@@ -1,8 +1,8 @@
-//! Words in; their outlines in the typeface of the program's pictures, and how wide they are, out.
+//! Glyph outlines and widths of text in the typeface of the program's pictures.
 //!
-//! The typeface is DejaVu Sans 2.37, part of the program, so that pictures look alike on every
-//! machine (`stages/export/fonts`, with its licence). It has the letters of Latin, Greek, Cyrillic
-//! and Arabic writing; what it lacks, and characters that nobody sees, are shown as question marks.
+//! The typeface is DejaVu Sans 2.37, which is part of the program, so that pictures are the same on
+//! every machine (`stages/export/fonts`, with its licence). It has Latin, Greek, Cyrillic and
+//! Arabic letters; characters that it lacks and invisible characters are drawn as question marks.
 
 use ab_glyph::{Font, FontRef, GlyphId, OutlinedGlyph, PxScale, PxScaleFont, ScaleFont, point};
 use contract::quote;
@@ -13,10 +13,10 @@ static SANS: LazyLock<FontRef<'static>> = LazyLock::new(|| {
         .expect("the file is part of the program, and a font")
 });
 
-/// The typeface at a height.
+/// The typeface at one size.
 type Scaled = PxScaleFont<&'static FontRef<'static>>;
 
-/// Heights of text.
+/// The sizes of text in pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TextSize {
     /// Names, numbers and legends.
@@ -49,14 +49,14 @@ impl TextSize {
 /// Height of a capital letter of the typeface, as a share of its em.
 const CAPITALS: f32 = 0.729;
 
-/// How far words reach to the right of their beginning, pixels.
+/// Width of text, pixels.
 #[must_use]
 pub(crate) fn width(size: TextSize, words: &str) -> f32 {
     let font = size.scaled();
     glyphs(words).fold((0.0, None), |(x, before), id| (x + step(&font, before, id), Some(id))).0
 }
 
-/// The outlines of words that begin at `x` and stand on the line `y`, pixels right and down.
+/// The outlines of text that begins at `x` with its baseline at `y`, pixels to the right and down.
 pub(crate) fn outlines(
     size: TextSize,
     words: &str,
@@ -73,8 +73,7 @@ pub(crate) fn outlines(
     })
 }
 
-/// The beginning of words that is no wider than `most` pixels, with an ellipsis where the rest is
-/// left out.
+/// The text shortened to at most `most` pixels, with an ellipsis in place of what is left out.
 #[must_use]
 pub(crate) fn shortened(size: TextSize, words: &str, most: f32) -> String {
     if width(size, words) <= most {
@@ -91,7 +90,7 @@ pub(crate) fn shortened(size: TextSize, words: &str, most: f32) -> String {
     short + "…"
 }
 
-/// From the beginning of one glyph to that of the next, pixels.
+/// Distance from the origin of one glyph to that of the next, pixels.
 fn step(font: &Scaled, before: Option<GlyphId>, id: GlyphId) -> f32 {
     before.map_or(0.0, |before| font.kern(before, id)) + font.h_advance(id)
 }

@@ -38,7 +38,7 @@ fn junit(result: &ResultFile, is_partial: bool) -> Result<String> {
     }
     let mut report = Report::unnamed();
     report.add_test_suite(suite);
-    let bug = |e| Error::new(Kind::Bug, "the JUnit report does not encode").because(e);
+    let bug = |e| Error::new(Kind::Bug, "JUnit report cannot be encoded").because(e);
     report.to_string().map_err(bug)
 }
 
@@ -67,7 +67,12 @@ fn skipped(why: &str) -> TestCaseStatus {
 /// The case of a run that left something out.
 fn left_out(result: &ResultFile) -> TestCase {
     let why = format!("inputs, models or regions were left out: {}", result.warnings.join("; "));
-    case("stillpoint", "everything was looked at", failed("partial", &why), &[])
+    case(
+        "stillpoint",
+        "all inputs, models and regions were processed",
+        failed("partial", &why),
+        &[],
+    )
 }
 
 /// The test cases of a robot: the robot, its joints, and its postures in other scans.
@@ -80,7 +85,7 @@ fn of_robot(suite: &mut TestSuite, robot: &RobotEntry) {
     output.extend(robot.reasons.iter().cloned());
     let is_trusted = robot.verdict == Verdict::Trusted.word();
     let why = || match robot.reasons.join("; ") {
-        why if why.is_empty() => format!("the robot is {}, and nothing says why", robot.verdict),
+        why if why.is_empty() => format!("the robot is {}, and no reason is given", robot.verdict),
         why => why,
     };
     let status =
@@ -180,7 +185,7 @@ joint &apos;wrist&apos; is undetermined (± 103.9°): it may as well stand at 2.
             "<failure message=\"inputs, models or regions were left out: scan 2",
             "type=\"partial\"/>",
             "<failure message=\"score 0.5\" type=\"doubtful\"/>",
-            "<failure message=\"the robot is refused, and nothing says why\" type=\"refused\"/>",
+            "<failure message=\"the robot is refused, and no reason is given\" type=\"refused\"/>",
             "<skipped message=\"250.000 mm ± 0.200 mm, and the robot is doubtful\"/>",
             "<system-err>scan 2 could not be read</system-err>",
         ] {

@@ -196,7 +196,7 @@ pub(crate) fn head(settings: &LasSettings, extent: &RecordExtent) -> Result<Vec<
     Ok(out)
 }
 
-/// The variable length records: those of the settings, of the extra bytes and of the compression.
+/// The variable length records of the settings, of the extra bytes and of the compression.
 fn records(settings: &LasSettings) -> Result<Vec<raw::Vlr>> {
     let mut records = Vec::new();
     for vlr in &settings.vlrs {

@@ -88,7 +88,7 @@ pub fn read_places(path: &Path, n_points: u64) -> Result<Vec<u64>> {
     let in_order = places.is_sorted_by(|a, b| a < b);
     let is_whole = in_order && places.last().is_none_or(|last| *last < n_points);
     is_whole.then_some(places).ok_or_else(|| {
-        let what = format!("the list is none of places among {n_points} points");
+        let what = format!("the list does not hold ascending places among {n_points} points");
         Error::bad_input(what).at(path.display()).hint("run the whole plant again")
     })
 }

@@ -39,7 +39,11 @@ pub(crate) fn write(path: &Path, grid: &OctomapGrid<'_>) -> Result<()> {
     let fits =
         (0..3).all(|i| grid.first[i] >= -HALF && grid.first[i] + grid.size[i] as i64 <= HALF);
     if !fits {
-        return Err(Error::new(Kind::Bug, "an octree does not reach so far").at(path.display()));
+        return Err(Error::new(
+            Kind::Bug,
+            "voxel lies outside the range of an octree of 16 levels",
+        )
+        .at(path.display()));
     }
     let (data, n_nodes) = match grid.node([-HALF; 3], DEPTH) {
         OctomapNode::Inner(data, n) => (data, n),

@@ -1,5 +1,5 @@
-//! Writes the points of a result as two PLY files, one of what moves and one of what stands still,
-//! for viewers and libraries that do not read LAS (Open3D, MeshLab).
+//! Writes the points of a result as two PLY files, one of moving and one of fixed points, for
+//! viewers and libraries that do not read LAS (Open3D, MeshLab).
 
 use crate::atomic::AtomicFile;
 use crate::refill::KINDS;
@@ -16,16 +16,16 @@ const PIECE: u64 = 1 << 16;
 /// last.
 const HEADER: usize = 512;
 
-/// Writes [`PLY`] to a folder, from some tiles (see [`tiles`](fn@crate::tiles)). Before each tile
-/// `told` decides whether to continue. Returns the numbers of points, `None` where there are no
-/// tiles.
+/// Writes [`PLY`] to a folder, from tiles (see [`tiles`](fn@crate::tiles)). Before each tile
+/// `may_continue` is called, and its error ends the work. Returns the numbers of moving and of
+/// fixed points, or `None` if there are no tiles.
 ///
 /// # Errors
-/// If files cannot be read or written, or if `told` ends the work.
+/// If files cannot be read or written, or if `may_continue` returns an error.
 pub fn write_ply(
     tiles: &[PathBuf],
     into: &Path,
-    told: impl Fn() -> Result<()>,
+    may_continue: impl Fn() -> Result<()>,
 ) -> Result<Option<[u64; 2]>> {
     if tiles.is_empty() {
         return Ok(None);
@@ -34,7 +34,7 @@ pub fn write_ply(
         Error::bad_input("tile cannot be read")
             .because(e)
             .at(tile.display())
-            .hint("`stillpoint verify` says whether the result is whole")
+            .hint("`stillpoint verify` checks whether the result is complete")
     };
     let open = |tile: &Path| las::Reader::from_path(tile).map_err(|e| bad(e, tile));
     // All tiles of a result have the same record format.
@@ -42,7 +42,7 @@ pub fn write_ply(
     let [moving, fixed] = PLY.map(|name| Ply::create(&into.join(name), has_color));
     let (mut moving, mut fixed) = (moving?, fixed?);
     for tile in tiles {
-        told()?;
+        may_continue()?;
         let bad = |e| bad(e, tile);
         let mut reader = open(tile)?;
         let mut piece = las::PointDataBuilder::new().for_header(reader.header()).build();
@@ -53,11 +53,11 @@ pub fn write_ply(
             }
         }
     }
-    told()?;
+    may_continue()?;
     Ok(Some([moving.finish()?, fixed.finish()?]))
 }
 
-/// What of a tile's point stands in a PLY file.
+/// The content of a point in a PLY file.
 struct PlyPoint {
     /// World, metres.
     xyz: [f64; 3],

@@ -150,7 +150,7 @@ struct RefillTile<'a> {
 }
 
 enum RefillRecords {
-    /// A tile of no points: its table of chunks is not looked at, whatever it states.
+    /// A tile without points: its table of chunks is not read, whatever it states.
     None,
     Plain(DirectReader),
     Compressed(Box<LasZipDecompressor<'static, BufReader<File>>>),
@@ -160,7 +160,8 @@ impl<'a> RefillTile<'a> {
     fn open(path: &'a Path, las: &LasSettings, stated: Option<StatedTile>) -> Result<Self> {
         let failed = |e| Error::of_read("tile cannot be read", path, e);
         let foreign = || {
-            let what = "this is no tile of the earlier result: its records are others";
+            let what =
+                "this is not a tile of the earlier result: the format of its records differs";
             Error::bad_input(what).at(path.display()).hint("run the whole plant again")
         };
         let mut file = BufReader::new(File::open(path).map_err(failed)?);

@@ -58,8 +58,8 @@ pub struct RobotEntry {
     /// Names of the joints whose values are metres; those of all others are radians.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub slides: Vec<String>,
-    /// Standard deviation of each free joint in the same unit; π/√3, that of a uniform angle,
-    /// where the points say nothing of it.
+    /// Standard deviation of each free joint in the same unit; π/√3, that of a uniform angle, if
+    /// the points do not determine it.
     pub sigma: NamedMap<f64>,
     /// Values of the joints that follow the free ones by a rule or in a closed loop, in the same
     /// units.
@@ -93,8 +93,8 @@ pub struct RobotEntry {
     /// with a wrist that no beam reached.
     #[serde(default)]
     pub equals: Vec<EqualEntry>,
-    /// For each joint other values within its limits, whole turns away, at which the robot stands
-    /// the same.
+    /// For each joint other values within its limits, whole turns away, at which the posture is the
+    /// same.
     #[serde(default)]
     pub equivalents: NamedMap<Vec<f64>>,
     /// The tool that it carries; the tool's joints and links follow the robot's own.
@@ -117,8 +117,8 @@ pub struct RobotEntry {
     /// Errors of the scans' stated poses near the robot.
     #[serde(default)]
     pub scans: Vec<ShiftEntry>,
-    /// Numbers of the scans in which it stands so, if it moved between scans; empty means all
-    /// scans.
+    /// Numbers of the scans in which the robot has this posture, if it moved between scans; empty
+    /// means all scans.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stands_in: Vec<u32>,
     /// Its postures in other scans, if it moved between scans.
@@ -260,8 +260,8 @@ pub struct ScanLabels {
     pub robot: String,
     /// Path of the array of links, i16.
     pub link: String,
-    /// Path of the list of places (u64, ascending) of points that a later scan replaced or proved
-    /// gone. Whatever their labels say, they are not part of the plant any more.
+    /// Path of the list of places (u64, ascending) of points that a later scan replaced or showed
+    /// to be gone. They are no longer part of the plant, whatever their labels are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub superseded: Option<String>,
 }

@@ -9,7 +9,7 @@ impl ResultFile {
     /// Reads the `result.json` of an output folder, or the file that `path` names.
     ///
     /// # Errors
-    /// If there is none, or if it has another version.
+    /// If there is no such file, or if it has another version.
     pub fn read(path: &Path) -> Result<Self> {
         let file = if path.is_dir() { path.join("result.json") } else { path.to_path_buf() };
         let text = std::fs::read(&file).map_err(|e| broken(e.to_string(), &file))?;
@@ -31,7 +31,7 @@ impl ResultFile {
     }
 
     /// Writes `result.json` to the output folder. It is the last file of a run, so that its
-    /// presence says that all others are complete.
+    /// presence shows that all others are complete.
     ///
     /// # Errors
     /// If the file cannot be written.

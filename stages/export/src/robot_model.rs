@@ -167,12 +167,12 @@ fn csv(fit: &Fit, model: &Model) -> String {
         let joint = &model.joints[j];
         let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
         let own = joint_fit(fit, model, j);
-        let told =
+        let is_determined =
             own.map_or_else(|| ",".into(), |f| format!("{:.9},{}", f.sigma, f.is_determined()));
         let limits = joint.limits.map_or_else(|| ",".into(), |[a, b]| format!("{a:.9},{b:.9}"));
         let name = quote::csv(&joint.name);
         let word = own.map_or("", |f| f.certainty.word());
-        let _ = writeln!(text, "{name},{value:.9},{unit},{told},{limits},{word}");
+        let _ = writeln!(text, "{name},{value:.9},{unit},{is_determined},{limits},{word}");
     }
     text
 }

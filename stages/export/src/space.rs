@@ -52,7 +52,7 @@ impl SpaceEntry {
     pub fn read(&self, out: &Path) -> Result<Space> {
         let path = out.join(&self.grid);
         let bad = |what: &str| {
-            let hint = "`stillpoint verify` says whether the result is whole";
+            let hint = "`stillpoint verify` checks whether the result is complete";
             Error::bad_input(what.to_owned()).at(path.display()).hint(hint)
         };
         let grid = self.voxels();
@@ -61,12 +61,13 @@ impl SpaceEntry {
         // no array at all.
         let n = n.filter(|n| *n > 0 && npy::n_bytes(&path).is_ok_and(|there| there == *n as u64));
         let n = n.ok_or_else(|| {
-            bad("the voxels of a robot's space are not as many as they are said to be")
+            bad("the number of voxels of a robot's space differs from the size of its grid")
         })?;
         let mut space = Space::unknown(grid);
         for (voxel, byte) in space.voxels_mut().iter_mut().zip(npy::read_bytes(&path, 0, n, 1)?) {
             let kind = SpaceKind::ALL.into_iter().find(|kind| *kind as u8 == byte);
-            *voxel = kind.ok_or_else(|| bad("a voxel of a robot's space is of no kind"))?;
+            *voxel =
+                kind.ok_or_else(|| bad("a voxel of a robot's space holds an unknown state"))?;
         }
         Ok(space)
     }

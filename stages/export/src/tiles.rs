@@ -33,7 +33,7 @@ impl Tiles {
         }
         let folder = out.join("tiles");
         std::fs::create_dir_all(&folder)
-            .map_err(|e| Error::of_file("folder cannot be made", &folder, e))?;
+            .map_err(|e| Error::of_file("folder cannot be created", &folder, e))?;
         let blocks = Blocks::new(settings.waiting_bytes);
         Ok(Some(Self { out: out.to_path_buf(), las: las.clone(), tiles: BTreeMap::new(), blocks }))
     }

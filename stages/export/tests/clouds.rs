@@ -235,7 +235,7 @@ fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
     for n in [u32::MAX, 3] {
         wrong(table + 4, n, "table of chunks");
     }
-    wrong(247, 2, "where 2 are due");
+    wrong(247, 2, "instead of 2");
     // Behind the first record and the number of points are the lengths of the layers.
     wrong(at + 8 + settings.record_len() + 4, u32::MAX, "layers of");
     // A tile of no points is not decoded, whatever its table states.

@@ -108,19 +108,19 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_that_two_scans_saw_tells_how_far_they_are_apart() {
-        let told = |patches: &[PlanePatch]| {
+    fn a_surface_seen_by_two_scans_gives_their_difference() {
+        let overlaps = |patches: &[PlanePatch]| {
             let mut all = Overlaps::default();
             patches.iter().for_each(|patch| all.add(patch));
             all.finish()
         };
-        let found = told(&[patch(0, 0.5, 0.0), patch(1, 0.503, 0.0), patch(0, 0.5, 0.0)]);
+        let found = overlaps(&[patch(0, 0.5, 0.0), patch(1, 0.503, 0.0), patch(0, 0.5, 0.0)]);
         assert_eq!(found.len(), 1);
         let z = |k: usize| found[0].seen[k].1[2];
         assert!((z(1) - z(0) - 0.003).abs() < 1e-12 && found[0].normal == [0.0, 0.0, 1.0]);
         // A single scan, two surfaces, and two surfaces at an angle give no overlap.
-        assert!(told(&[patch(0, 0.5, 0.0), patch(0, 0.52, 0.0)]).is_empty());
-        assert!(told(&[patch(0, 0.5, 0.0), patch(1, 0.56, 0.0)]).is_empty());
-        assert!(told(&[patch(0, 0.5, 0.0), patch(1, 0.5, 0.1)]).is_empty());
+        assert!(overlaps(&[patch(0, 0.5, 0.0), patch(0, 0.52, 0.0)]).is_empty());
+        assert!(overlaps(&[patch(0, 0.5, 0.0), patch(1, 0.56, 0.0)]).is_empty());
+        assert!(overlaps(&[patch(0, 0.5, 0.0), patch(1, 0.5, 0.1)]).is_empty());
     }
 }

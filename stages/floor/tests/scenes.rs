@@ -176,7 +176,7 @@ fn mirror_images_below_the_floor_are_refused() {
 }
 
 #[test]
-fn without_scanner_a_ceiling_is_told_by_what_lies_around() {
+fn without_a_scanner_a_ceiling_is_recognised_by_its_surroundings() {
     let mut scene = Scene::default();
     scene.surface(0, ROOM, 1.0, wavy, |x, _| x < 2.0);
     scene.surface(0, ROOM, 1.0, |_, _| 2.8, |_, _| true);
@@ -195,7 +195,7 @@ fn no_floor_gives_no_level() {
 }
 
 #[test]
-fn cut_anywhere_the_answer_is_the_same() {
+fn the_result_does_not_depend_on_the_order_of_parts() {
     let mut scene = Scene::default();
     scene.surface(0, ROOM, 1.0, wavy, |_, _| true);
     scene.surface(0, [[0.0, 1.2], [0.0, 0.8]], 1.0, |_, _| 0.7, |_, _| true);

@@ -2,7 +2,8 @@
 
 use crate::judge::{Judged, PoseEvidence, judge};
 use crate::refine::{Chosen, Laid, NEAR, WIDE, apart};
-use crate::{SessionSurfaces, search};
+use crate::search;
+use crate::session::SessionSurfaces;
 use contract::Fan;
 use geometry::{Pose, Vector};
 
@@ -41,12 +42,12 @@ const MAX_TOLD: usize = 4;
 /// A pose of the new session in the earlier one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FramePlace {
-    /// The pose, each session about its own origin, with its uncertainty.
+    /// The pose between the sessions, each about its own origin, with its uncertainty.
     pub laid: Laid,
     /// The evidence for and against it.
     pub evidence: PoseEvidence,
-    /// By how many more surfels the next best place is contradicted; `None` where there is no
-    /// other place.
+    /// Difference between the contradicting surfels of the next best place and of this one; `None`
+    /// if there is no other place.
     pub margin: Option<i64>,
 }
 
@@ -91,10 +92,10 @@ pub fn at_stated(old: &SessionSurfaces, new: &SessionSurfaces, stated: &Pose) ->
     }
 }
 
-/// The pose near a rough one that a person gives, and whether surfaces and beams bear it out.
+/// The pose near a rough one that a user gives, if surfaces and beams confirm it.
 ///
 /// # Errors
-/// The pose as far as it could be refined, where they do not.
+/// The refined pose, if surfaces and beams do not confirm it; `None` if it could not be refined.
 pub fn from_rough(
     old: &SessionSurfaces,
     new: &SessionSurfaces,
@@ -105,11 +106,11 @@ pub fn from_rough(
     if is_borne_out(&place) { Ok(place) } else { Err(Some(Box::new(place))) }
 }
 
-/// Where the new session lies in the earlier one, searched over all shifts and yaws; `stated` is
-/// one of the poses that are asked for.
+/// The pose of the new session in the earlier one, searched over all shifts and yaws; `stated` is
+/// one of the poses that are tested.
 ///
 /// # Errors
-/// No pose is clear.
+/// The reason, if no pose is clear.
 pub fn find(
     old: &SessionSurfaces,
     new: &SessionSurfaces,

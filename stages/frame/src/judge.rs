@@ -2,9 +2,10 @@
 //! which lie where beams of the other passed through. Level surfaces do not count, since a floor
 //! fits on itself in any place.
 
+use crate::panorama::Panorama;
 use crate::refine::Laid;
+use crate::session::SessionSurfaces;
 use crate::surfels::Surfel;
-use crate::{Panorama, SessionSurfaces};
 use geometry::{Pose, Vector};
 use nalgebra::Point3;
 

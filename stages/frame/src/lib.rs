@@ -42,6 +42,7 @@ mod panorama;
 mod plans;
 mod refine;
 mod search;
+mod session;
 mod surfels;
 #[cfg(test)]
 mod tests;
@@ -50,13 +51,5 @@ pub use decide::{Answer, FramePlace, Refusal, at_stated, find, from_rough, is_st
 pub use judge::PoseEvidence;
 pub use panorama::Panorama;
 pub use refine::Laid;
+pub use session::SessionSurfaces;
 pub use surfels::{Gathered, Surfel, Surfels};
-
-/// The surfaces of one session, and how far its beams went.
-#[derive(Debug, Clone, Default)]
-pub struct SessionSurfaces {
-    /// Surfaces, about an origin of the session's own.
-    pub surfels: Surfels,
-    /// Scanners, about the same origin.
-    pub eyes: Vec<Panorama>,
-}

@@ -1,4 +1,4 @@
-//! How far the beams of one scan went in each direction, as a coarse raster.
+//! The range of the beams of one scan in each direction, as a coarse raster.
 
 use geometry::direction::spherical;
 use geometry::{Pose, Vector};
@@ -23,7 +23,7 @@ const NEAREST: f32 = 0.5;
 /// just above a flat top.
 const MIN_SEEN: usize = 6;
 
-/// How far the beams of one scanner went.
+/// The ranges of the beams of one scanner.
 #[derive(Debug, Clone)]
 pub struct Panorama {
     /// Pose `scan_from_local`; the local frame is the session's world about its origin.

@@ -1,42 +1,42 @@
-//! What the scans saw of the space around a robot, and its posture, in; voxels that are seen free
-//! and that the robot itself fills out.
+//! Marks, in the voxel grid around a robot, the voxels that beams passed through as free, and those
+//! that the bodies of robots fill as robot.
 //!
-//! What a robot hides is unknown, not free: a voxel is free only where a beam went on beyond it. A
-//! beam that did not come back proves nothing.
+//! What a robot hides is unknown and not free: a voxel is free only if a beam ended beyond it. A
+//! beam without a return proves nothing.
 
 use contract::{Fan, Region, Space, SpaceGrid, SpaceKind, View};
 use geometry::{Aabb, Eye, Pose};
 use robot::Model;
 
-/// Half the diagonal of a cube of edge 1: a beam that ends this far beyond a voxel's middle has
-/// left it.
+/// Half the diagonal of a cube of edge 1. A beam that ends this far beyond the centre of a voxel,
+/// times the voxel's edge, has left the voxel.
 const HALF_DIAGONAL: f64 = 0.866;
-/// Range noise and rounding that a beam must go beyond that, metres.
+/// Distance that a beam must end beyond the voxel, metres: range noise and rounding.
 const BEYOND: f64 = 0.01;
-/// Voxels that are looked at by one thread.
+/// Number of voxels in one piece of parallel work.
 const PIECE: usize = 1 << 14;
 
-/// What beams went through.
-pub struct Passed<'a> {
+/// Tells which voxels of a region beams passed through.
+pub struct PassedVoxels<'a> {
     region: &'a Region,
     eyes: Vec<Eye<'a>>,
-    /// Edge of the voxels that are asked about, metres.
+    /// Edge of the queried voxels, metres.
     edge: f64,
-    /// What the robot fills, in voxels of half the edge; `None` without a robot.
+    /// The voxels of half that edge that the robot's body fills; `None` without a robot.
     body: Option<Space>,
 }
 
-impl<'a> Passed<'a> {
-    /// Of views of a region, for voxels of this edge.
+impl<'a> PassedVoxels<'a> {
+    /// Prepares queries of the views of a region, for voxels with this edge in metres.
     #[must_use]
     pub fn new(region: &'a Region, views: &'a [View], edge: f64) -> Self {
         let eyes = views.iter().map(|view| Eye::new(&view.images)).collect();
         Self { region, eyes, edge, body: None }
     }
 
-    /// The same about a robot that stood with its links at `world_from_links` as it was scanned:
-    /// of a voxel beside it, the eighths that it fills or touches need not be seen, since it hides
-    /// them itself.
+    /// The same around a robot that was scanned with its links at `world_from_links`. Beams need
+    /// not reach those octants of a voxel that the robot fills or touches, since it hides them
+    /// itself.
     #[must_use]
     pub fn about(self, model: &Model, world_from_links: &[Pose]) -> Self {
         let mut bounds = Aabb::EMPTY;
@@ -50,51 +50,55 @@ impl<'a> Passed<'a> {
         }
         let half = 0.5 * self.edge;
         let mut body = Space::unknown(SpaceGrid::over(&bounds.grown(2.0 * half), half));
-        stand(&mut body, SpaceKind::Robot, model, world_from_links);
+        mark_body(&mut body, SpaceKind::Robot, model, world_from_links);
         Self { body: Some(body), ..self }
     }
 
-    /// Whether a beam went on beyond the voxel with this middle (world, metres), or beams got to
-    /// the middle of each of its eighths: in a voxel beside a surface none goes on, and where
-    /// one ends in it there is a point, which makes of it what that is. Eighths that the robot
-    /// itself fills or touches are left out, if not all of them are.
+    /// Whether the voxel with this centre (world frame, metres) is free: a beam ended beyond the
+    /// whole voxel, or beams reached the centre of each of its eight octants. The second test
+    /// serves voxels in front of a surface, where no beam goes on far enough. A voxel that a beam
+    /// ended in holds a point, and its kind follows from that point. An octant that the robot
+    /// itself fills or touches need not be reached, if another one is.
     #[must_use]
-    pub fn is_free(&self, middle: [f64; 3]) -> bool {
+    pub fn is_free(&self, centre: [f64; 3]) -> bool {
         let beyond = (HALF_DIAGONAL * self.edge + BEYOND) as f32;
-        let p: [f32; 3] = std::array::from_fn(|i| (middle[i] - self.region.origin[i]) as f32);
-        let quarter = 0.25 * self.edge as f32;
-        let eighth = |k: usize| {
-            std::array::from_fn(|i| if k >> i & 1 == 0 { p[i] - quarter } else { p[i] + quarter })
+        let p: [f32; 3] = std::array::from_fn(|i| (centre[i] - self.region.origin[i]) as f32);
+        let quarter_edge = 0.25 * self.edge as f32;
+        let octant = |k: usize| {
+            std::array::from_fn(|i| {
+                if k >> i & 1 == 0 { p[i] - quarter_edge } else { p[i] + quarter_edge }
+            })
         };
-        if self.is_passed(p, 2.0 * quarter, beyond) {
+        if self.is_passed(p, 2.0 * quarter_edge, beyond) {
             return true;
         }
         let mut n_passed = 0;
-        let is_told = |k: usize| {
-            let is_passed = self.is_passed(eighth(k), quarter, 0.0);
+        let is_known = |k: usize| {
+            let is_passed = self.is_passed(octant(k), quarter_edge, 0.0);
             n_passed += usize::from(is_passed);
-            is_passed || self.is_body(eighth(k))
+            is_passed || self.is_body(octant(k))
         };
-        (0..8).all(is_told) && n_passed > 0
+        (0..8).all(is_known) && n_passed > 0
     }
 
-    /// Whether the robot fills or touches the eighth of a voxel with this middle, frame of the
-    /// region, metres.
-    fn is_body(&self, middle: [f32; 3]) -> bool {
+    /// Whether the robot fills or touches the octant of a voxel with this centre, region
+    /// frame, metres.
+    fn is_body(&self, centre: [f32; 3]) -> bool {
         let Some(body) = &self.body else { return false };
         let grid = body.grid();
-        let at: [f64; 3] = std::array::from_fn(|i| f64::from(middle[i]) + self.region.origin[i]);
+        let at: [f64; 3] = std::array::from_fn(|i| f64::from(centre[i]) + self.region.origin[i]);
         let is_filled = |k: usize| {
-            let mut beside = at;
+            let mut neighbour = at;
             if k < 6 {
-                beside[k / 2] += if k.is_multiple_of(2) { grid.edge } else { -grid.edge };
+                neighbour[k / 2] += if k.is_multiple_of(2) { grid.edge } else { -grid.edge };
             }
-            grid.index(beside).is_some_and(|at| body.voxels()[at] == SpaceKind::Robot)
+            grid.index(neighbour).is_some_and(|at| body.voxels()[at] == SpaceKind::Robot)
         };
         (0..7).any(is_filled)
     }
 
-    /// Whether a beam in a cell about a place of the region went on so far beyond it, metres.
+    /// Whether a beam within `footprint` of a place ended more than `beyond` behind it; region
+    /// frame, metres.
     fn is_passed(&self, p: [f32; 3], footprint: f32, beyond: f32) -> bool {
         let is_passed = |eye: &Eye<'_>| {
             let look = eye.look(p, footprint);
@@ -104,8 +108,8 @@ impl<'a> Passed<'a> {
     }
 }
 
-/// Frees every voxel that beams went through.
-pub fn see(space: &mut Space, passed: &Passed<'_>, fan: &dyn Fan) {
+/// Marks each voxel as free that beams passed through.
+pub fn mark_free(space: &mut Space, passed: &PassedVoxels<'_>, fan: &dyn Fan) {
     let grid = *space.grid();
     let pieces = space.voxels_mut().chunks_mut(PIECE).enumerate().collect();
     fan.fan(pieces, |(n, voxels): (usize, &mut [SpaceKind])| {
@@ -117,9 +121,9 @@ pub fn see(space: &mut Space, passed: &Passed<'_>, fan: &dyn Fan) {
     });
 }
 
-/// Fills the body of a robot that stands with its links at `world_from_links`, what its surface
-/// encloses, with a kind: its own or another's.
-pub fn stand(space: &mut Space, kind: SpaceKind, model: &Model, world_from_links: &[Pose]) {
+/// Marks the voxels inside the body of a robot, which its surface encloses, with a kind: the
+/// robot's own or another robot's. `world_from_links` has the pose of each link.
+pub fn mark_body(space: &mut Space, kind: SpaceKind, model: &Model, world_from_links: &[Pose]) {
     let grid = *space.grid();
     let mut body = Aabb::EMPTY;
     let mut surface = Vec::new();
@@ -146,8 +150,8 @@ mod tests {
     use geometry::depth::Empty;
     use geometry::{DepthImage, Point};
 
-    /// A scanner at the origin looks along x at a wall 4 m away, half of it behind a plate 2 m
-    /// away.
+    /// The view of a scanner at the origin that looks along x at a wall 4 m away, half of it behind
+    /// a plate 2 m away.
     fn view() -> View {
         let turn = nalgebra::UnitQuaternion::from_axis_angle(
             &nalgebra::Vector3::y_axis(),
@@ -176,12 +180,12 @@ mod tests {
     }
 
     #[test]
-    fn what_a_thing_hides_is_unknown() {
+    fn space_behind_an_object_is_unknown() {
         let bounds = Aabb { min: [0.5, -1.0, -0.5], max: [5.0, 1.0, 0.5] };
         let region = Region { origin: Point::origin(), bounds };
         let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.1));
         let views = [view()];
-        see(&mut space, &Passed::new(&region, &views, 0.1), &OneByOne);
+        mark_free(&mut space, &PassedVoxels::new(&region, &views, 0.1), &OneByOne);
         let at = |space: &Space, p| space.voxels()[space.grid().index(p).expect("inside")];
         assert_eq!(at(&space, [3.0, -0.5, 0.0]), SpaceKind::Free);
         assert_eq!(at(&space, [1.5, 0.3, 0.0]), SpaceKind::Free);
@@ -189,7 +193,7 @@ mod tests {
         for p in [[3.0, 0.5, 0.0], [4.6, -0.5, 0.0], [0.7, 0.9, 0.0]] {
             assert_eq!(at(&space, p), SpaceKind::Unknown, "{p:?}");
         }
-        // Up to the wall space is seen, and no farther.
+        // Space up to the wall is free, and space behind it is unknown.
         assert_eq!(at(&space, [3.95, -0.5, 0.0]), SpaceKind::Free);
         assert_eq!(at(&space, [4.05, -0.5, 0.0]), SpaceKind::Unknown);
         let wall = space.grid().index([4.0, -0.5, 0.0]).expect("inside");
@@ -216,9 +220,9 @@ mod tests {
                     *voxel = SpaceKind::Robot;
                 }
             }
-            Passed { body: Some(body), ..Passed::new(&region, &views, 0.1) }
+            PassedVoxels { body: Some(body), ..PassedVoxels::new(&region, &views, 0.1) }
         };
-        assert!(!Passed::new(&region, &views, 0.1).is_free(at_edge));
+        assert!(!PassedVoxels::new(&region, &views, 0.1).is_free(at_edge));
         assert!(filled(0.0).is_free(at_edge));
         assert!(!filled(0.2).is_free(at_edge), "the robot is not there");
         // Where no eighth was seen nothing is known.

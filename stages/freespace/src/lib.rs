@@ -1,21 +1,22 @@
-//! Views of a region in; what their beams say of its space out: which places they went through,
-//! which they ended on, and which they never reached; and a grid of known space about a robot.
+//! Free space from the beams of scans: whether beams passed through a place, ended on it or never
+//! reached it, and a voxel grid of the known space around a robot.
 //!
-//! A place counts as free only where a beam went on beyond it: what something hides is unknown.
+//! A place counts as free only if a beam ended beyond it. What is hidden behind an object is
+//! unknown.
 #![forbid(unsafe_code)]
 
 mod known_space;
 mod visibility;
 
-pub use known_space::{Passed, see, stand};
+pub use known_space::{PassedVoxels, mark_body, mark_free};
 pub use visibility::{Visibility, VisibilityQuery};
 
-/// Tunables of the grids of known space about robots.
+/// The settings of the grids of known space around robots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Edge of the voxels that tell seen from unseen space around robots, metres.
+    /// Edge of the voxels of a grid, metres.
     pub edge: f64,
-    /// Whether grids of known space are made at all.
+    /// Whether grids of known space are made.
     pub enabled: bool,
 }
 

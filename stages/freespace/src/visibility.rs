@@ -1,57 +1,59 @@
-//! A place and the views of some scans in; whether their beams went through it, ended on it, or
-//! never got there, out.
+//! Tells for a place, from the views of scans, whether their beams passed through it, ended on it
+//! or did not reach it.
 
 use contract::{Region, View};
 use geometry::Eye;
 use geometry::depth::{LANES, Look, lanes};
 
-/// A beam that ended so far behind a place went through it, metres.
+/// A beam that ended farther than this behind a place passed through it, metres.
 const BEYOND: f32 = 0.04;
-/// A beam that ended so near a place ended on it, metres: noise, registration and the cell's slope.
+/// A beam that ended within this distance of a place ended on it, metres: range noise, registration
+/// and the slope of the surface within a cell of the depth image.
 const ON: f32 = 0.02;
-/// A beam that went on so far beyond a point of its own session passed through the thing that the
-/// point is of, metres: rows that graze a flat top end up to this far apart on it, 5 m away, 0.13°
-/// between rows, at 2°.
+/// A beam that ended farther than this behind a point of its own session passed through the object
+/// of that point, metres. Example for the value: rows 0.13° apart that graze a flat surface at 2°
+/// from 5 m away end this far from each other.
 const PIERCED: f32 = 0.3;
-/// Beams farther apart than this at a place say nothing of that, metres: one row of them may pass
-/// over all of a flat top.
+/// Views whose beams are farther apart than this at a place cannot show that the object is pierced,
+/// metres: a single row may pass over all of a flat surface.
 const MAX_GAP: f64 = 0.02;
-/// Width in which beams are asked, metres.
+/// Width around a place within which beams are looked up, metres.
 const FOOTPRINT: f32 = 0.012;
 
-/// What scans say of a place.
+/// What the beams of scans show about a place, from the weakest statement to the strongest.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Visibility {
-    /// No beam went there.
+    /// No beam went in the direction of the place.
     #[default]
     Unseen = 0,
-    /// Something nearer hid it.
+    /// A nearer surface hides the place.
     Hidden = 1,
-    /// Beams got there and ended little beyond it: what is there may be what they ended on, or not.
+    /// Beams ended a little beyond the place, so that it may lie on the surface that they hit or in
+    /// front of it.
     Close = 2,
-    /// Beams, and all around them, went on beyond it: nothing is there.
+    /// All beams around the place ended far beyond it: nothing is there.
     Through = 3,
-    /// A beam ended there: something is.
+    /// A beam ended at the place: something is there.
     Onto = 4,
 }
 
-/// Scans that are asked.
+/// Queries of the visibility of places in the views of a region.
 pub struct VisibilityQuery<'a> {
     region: &'a Region,
     views: Vec<(&'a View, Eye<'a>)>,
 }
 
 impl<'a> VisibilityQuery<'a> {
-    /// Views of a region.
+    /// Prepares queries of the views of a region.
     #[must_use]
     pub fn new(region: &'a Region, views: &'a [View]) -> Self {
         let views = views.iter().map(|view| (view, Eye::new(&view.images))).collect();
         Self { region, views }
     }
 
-    /// Whether a beam of any scan went on far beyond a place in the world, whatever others met
-    /// there.
+    /// Whether a beam of any scan ended far beyond a place, whatever other beams show. `world` is
+    /// in the world frame, metres.
     #[must_use]
     pub fn is_pierced(&self, world: [f64; 3]) -> bool {
         let goes_on = |look: Look| look.near.is_finite() && look.near - look.range > PIERCED;
@@ -59,24 +61,24 @@ impl<'a> VisibilityQuery<'a> {
         self.looks(world).any(|(view, look)| is_dense(view, &look) && goes_on(look))
     }
 
-    /// What each scan that looked there has.
+    /// The look-up of each view that has beams in the direction of a place.
     fn looks(&self, world: [f64; 3]) -> impl Iterator<Item = (&View, Look)> + '_ {
         let p = self.local(world);
         self.views.iter().filter_map(move |(view, eye)| Some((*view, eye.look(p, FOOTPRINT)?)))
     }
 
-    /// What the scans say of a place in the world: the strongest of what each of them says.
+    /// The visibility of a place in the world frame, metres: the strongest statement of all views.
     #[must_use]
     pub fn look(&self, world: [f64; 3]) -> Visibility {
         self.looks(world).map(|(_, look)| Visibility::of(&look)).max().unwrap_or_default()
     }
 
-    /// The same of many places, scan after scan: an image stays in the cache while neighbours are
-    /// asked for.
+    /// Computes [`Self::look`] for many places (world frame, metres) into `out`, one after another
+    /// for each view, so that its depth image stays in the processor's cache.
     pub fn look_all(&self, world: &[[f64; 3]], out: &mut Vec<Visibility>) {
         out.clear();
         out.resize(world.len(), Visibility::Unseen);
-        // Places of which it is not known yet that something is there.
+        // Places where no view has shown a surface so far; a further view cannot change the others.
         let mut open: Vec<(u32, [f32; 3])> =
             (0..).zip(world).map(|(i, world)| (i, self.local(*world))).collect();
         for (_, eye) in &self.views {
@@ -124,7 +126,8 @@ mod tests {
     use geometry::depth::Empty;
     use geometry::{Aabb, DepthImage, Point, Pose};
 
-    /// A plate 3 m ahead that another surface stands `behind`, seen through a gap in it.
+    /// A plate 3 m in front of the scanner with a gap, and another surface `behind` metres behind
+    /// it.
     fn view(behind: f32) -> View {
         let mut image = DepthImage::new(Pose::identity(), 0.5, 200.0);
         for (i, j) in (-250..250).flat_map(|i| (-250..250).map(move |j| (i, j))) {
@@ -140,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_that_ends_on_the_same_thing_a_little_farther_pierces_nothing() {
+    fn a_beam_that_ends_slightly_behind_pierces_nothing() {
         let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
         let is_pierced = |behind: f32, x: f64| {
             VisibilityQuery::new(&region, &[view(behind)]).is_pierced([x, 0.0, 3.0])

@@ -292,7 +292,7 @@ pub struct Looks {
 }
 
 impl Looks {
-    /// Looks of which nothing is known.
+    /// Looks in directions without beams.
     pub(crate) const NOTHING: Self = Self {
         near: [f32::NAN; LANES],
         far: [f32::NAN; LANES],
@@ -300,7 +300,7 @@ impl Looks {
         range: [0.0; LANES],
     };
 
-    /// The look of one lane; `None` where nothing is known.
+    /// The look of one lane; `None` if no beam went there.
     #[inline]
     #[must_use]
     pub fn get(&self, i: usize) -> Option<Look> {

@@ -1,9 +1,9 @@
-//! Judges whether a body stands at a pose, from the depth images of scans with known scanner
-//! positions and the bare points of the other scans.
+//! Probes a body at a pose against the depth images of scans with known scanner positions, and
+//! against the points of the other scans.
 //!
-//! All stages ask this question through [`Evidence::probe`], so that it has one answer.
+//! All stages use [`Evidence::probe`], so that their results agree.
 
-use crate::probe::{Probe, probe};
+use crate::probe::{Probe, SurfaceSamples, probe};
 use crate::{Eye, NearestField, Pose};
 use std::sync::Arc;
 
@@ -33,8 +33,8 @@ impl Cloud {
     }
 }
 
-/// Price of a surface sample without a nearby point where no beam can say whether it is hidden. Two
-/// or three scanners see a third to a half of a robot, so absence must cost something, but the
+/// Price of a surface sample without a nearby point if no beam can show whether it is hidden. Two
+/// or three scanners see a third to a half of a robot, so that absence must cost something, but the
 /// right posture must still score above zero.
 const ABSENT_PRICE: f32 = 0.25;
 /// Largest distance along the surface between a sample and the point that confirms it, metres; the
@@ -54,7 +54,7 @@ impl<'a> Evidence<'a> {
         &self.eyes
     }
 
-    /// Judges surface samples of a body that stands at `local_from_body`. `points` (metres) and
+    /// Probes surface samples of a body at the pose `local_from_body`. `points` (metres) and
     /// outward unit `normals` are given in the body's frame; a beam that ends within `tolerance`
     /// metres of a sample confirms it.
     #[must_use]
@@ -65,7 +65,8 @@ impl<'a> Evidence<'a> {
         local_from_body: &Pose,
         tolerance: f32,
     ) -> Probe {
-        self.probe_more(Probe::default(), (points, normals), local_from_body, tolerance)
+        let samples = SurfaceSamples { points, normals };
+        self.probe_more(Probe::default(), samples, local_from_body, tolerance)
     }
 
     /// Adds further samples to the result `before` of other samples of the same body. The sum is
@@ -74,7 +75,7 @@ impl<'a> Evidence<'a> {
     pub fn probe_more(
         &self,
         before: Probe,
-        samples: (&[[f32; 3]], &[[f32; 3]]),
+        samples: SurfaceSamples<'_>,
         local_from_body: &Pose,
         tolerance: f32,
     ) -> Probe {
@@ -99,10 +100,11 @@ impl Cloud {
     fn probe(
         &self,
         before: Probe,
-        (points, normals): (&[[f32; 3]], &[[f32; 3]]),
+        samples: SurfaceSamples<'_>,
         local_from_body: &Pose,
         tolerance: f32,
     ) -> Probe {
+        let SurfaceSamples { points, normals } = samples;
         let m = crate::depth::rows(local_from_body);
         let mut out = Probe { n: before.n + points.len() as u32, ..before };
         for (p, n) in points.iter().zip(normals) {

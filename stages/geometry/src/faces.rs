@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn places_asked_together_are_seen_as_one_by_one() {
+    fn places_looked_up_together_give_the_same_as_one_by_one() {
         let mut random = 7_u64;
         let mut next = || {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

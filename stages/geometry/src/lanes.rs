@@ -1,17 +1,17 @@
-//! Places in; their coordinates axis by axis out, as vector registers take them.
+//! Rearranges the coordinates of several places axis by axis, as vector registers take them.
 
-/// Places that are asked about together.
+/// Number of places that are looked up together.
 pub const LANES: usize = 16;
 
-/// Coordinates of [`LANES`] places, axis by axis: what is reckoned of all of them is so in vector
-/// registers.
+/// Coordinates of [`LANES`] places, axis by axis, so that the compiler computes with all places in
+/// vector registers.
 pub type Lanes = [[f32; LANES]; 3];
 
-/// Places as lanes, the last one in those that are left over; at least one, at most [`LANES`].
+/// Rearranges at least one and at most [`LANES`] places; the last one fills the remaining lanes.
 #[inline]
 #[must_use]
 pub fn lanes(places: &[[f32; 3]]) -> Lanes {
-    // A loop is inlined where arrays made of closures are not.
+    // A loop is inlined; an array made with a closure is not.
     let mut out = [[0.0; LANES]; 3];
     for i in 0..LANES {
         let place = places[i.min(places.len() - 1)];

@@ -75,7 +75,7 @@ impl DepthLevel {
                 let near = is_near.iter_mut().zip(&near_hit[v % n_kept]);
                 near.for_each(|(own, near)| *own |= *near);
             }
-            // `is_silent` is asked for all cells of the row, so that the loop is vectorised.
+            // `is_silent` is evaluated for all cells of the row, so that the loop is vectorised.
             let open = silent.iter_mut().zip(&is_near).enumerate();
             open.for_each(|(u, (silent, is_near))| *silent = !*is_near & is_silent(u, v));
             let row = self.cells[v * width..(v + 1) * width].iter_mut().zip(&silent);

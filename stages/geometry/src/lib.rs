@@ -35,6 +35,7 @@ mod lanes;
 mod level;
 pub mod narrow;
 pub mod plane;
+mod pose;
 pub mod probe;
 pub mod robust;
 mod spread;
@@ -45,11 +46,5 @@ pub use evidence::Evidence;
 pub use faces::{Eye, Faces};
 pub use field::NearestField;
 pub use plane::{Moments, Plane};
-pub use probe::Probe;
-
-/// A rigid motion `a_from_b`: it converts coordinates from frame `b` to frame `a`, metres.
-pub type Pose = nalgebra::Isometry3<f64>;
-/// A position, metres.
-pub type Point = nalgebra::Point3<f64>;
-/// A displacement or direction, metres or unit length.
-pub type Vector = nalgebra::Vector3<f64>;
+pub use pose::{Point, Pose, Vector};
+pub use probe::{Probe, SurfaceSamples};

@@ -10,7 +10,7 @@ pub const NO_RETURN_WEIGHT: f32 = 0.3;
 /// Cosine of the angle of incidence below which a surface is too oblique to appear in a scan.
 pub const MIN_FACING: f32 = 0.15;
 
-/// Counts of what the beams say about a set of surface samples at one pose.
+/// Counts of the evidence of beams about a set of surface samples at one pose.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Probe {
     /// Sum over the samples of −β·violation where seen through, a match in 0..1 where a beam ends
@@ -33,8 +33,8 @@ impl Probe {
         if self.n == 0 { 0.0 } else { self.score / self.n as f32 }
     }
 
-    /// Counts one sample: `through` says how far it is seen through, `on` how well a beam ends on
-    /// it, each in 0..1. Being seen through outweighs a match.
+    /// Counts one sample: `through` is the degree to which beams pass through it, `on` how well a
+    /// beam ends on it, each in 0..1. Passing through outweighs a match.
     #[inline]
     pub fn count(&mut self, through: f32, on: f32) {
         if through > 0.0 {
@@ -78,18 +78,27 @@ const SEEN_THROUGH_PRICE: f32 = 1.5;
 /// the body gain nothing, and small, since most of a body is always hidden.
 pub const HIDDEN_PRICE: f32 = 0.1;
 
-/// Judges surface samples of a body that stands at `local_from_body`; `points` (metres) and outward
-/// unit `normals` are given in the body's frame. A beam that passes through a sample in one scan
-/// outweighs a match in any other (METHOD.md §8). The result includes `before`, that of other
-/// samples.
+/// Samples of the surface of a body, frame of the body; both slices have the same length.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfaceSamples<'a> {
+    /// Places, metres.
+    pub points: &'a [[f32; 3]],
+    /// Outward unit normals.
+    pub normals: &'a [[f32; 3]],
+}
+
+/// Probes surface samples of a body at the pose `local_from_body` against depth images. A beam
+/// that passes through a sample in one scan outweighs a match in any other (METHOD.md §8).
+/// `tolerance` is in metres. The result includes `before`, which is that of other samples.
 #[must_use]
 pub fn probe(
     eyes: &[Eye<'_>],
     before: Probe,
-    (points, normals): (&[[f32; 3]], &[[f32; 3]]),
+    samples: SurfaceSamples<'_>,
     local_from_body: &Pose,
     tolerance: f32,
 ) -> Probe {
+    let SurfaceSamples { points, normals } = samples;
     let to_local = rows(local_from_body);
     let mut out = Probe { n: before.n + points.len() as u32, ..before };
     for (points, normals) in points.chunks(BLOCK).zip(normals.chunks(BLOCK)) {
@@ -103,7 +112,7 @@ pub fn probe(
 /// Number of samples that are judged together, so that the loops over them are vectorised.
 const BLOCK: usize = 80;
 
-/// Samples in the local frame and what is known of them so far.
+/// Samples in the local frame and the evidence about them so far.
 struct SampleBlock {
     n: usize,
     p: [[f32; BLOCK]; 3],
@@ -184,7 +193,7 @@ fn said(looks: &Looks, tolerance: f32) -> ([f32; LANES], [f32; LANES]) {
         let gone = ((ahead - tolerance) * per_tolerance).min(1.0);
         let gone = if ahead == f32::INFINITY { NO_RETURN_WEIGHT } else { gone };
         let off = (near - range).abs().min((far - range).abs());
-        // Where `near` is NaN nothing is known, even if beams in neighbouring cells went on.
+        // Where `near` is NaN no beam went, even if beams in neighbouring cells did.
         let is_through = (ahead > tolerance) & !near.is_nan();
         through[i] = if is_through { gone } else { 0.0 };
         on[i] = if is_through { 0.0 } else { (1.0 - off * per_tolerance).max(0.0) };
@@ -219,7 +228,7 @@ mod tests {
         let (points, normals) = (vec![[0.0, 0.0, 0.0]; 1], vec![[0.0, 0.0, -1.0]; 1]);
         let at = |z: f64| {
             let pose = Pose::from_parts(Vector::new(0.0, 0.0, z).into(), Default::default());
-            let samples = (points.as_slice(), normals.as_slice());
+            let samples = SurfaceSamples { points: &points, normals: &normals };
             probe(&[Eye::new([&image])], Probe::default(), samples, &pose, 0.04)
         };
         let on = at(3.0);
@@ -234,10 +243,11 @@ mod tests {
     /// The reference: judges one sample after the other, by one scanner after the other.
     fn one_by_one(
         eyes: &[Eye<'_>],
-        (points, normals): (&[[f32; 3]], &[[f32; 3]]),
+        samples: SurfaceSamples<'_>,
         pose: &Pose,
         tolerance: f32,
     ) -> Probe {
+        let SurfaceSamples { points, normals } = samples;
         let (to_local, per_tolerance) = (rows(pose), 1.0 / tolerance);
         let mut out = Probe { n: points.len() as u32, ..Probe::default() };
         for (p, n) in points.iter().zip(normals) {
@@ -268,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_judged_together_are_judged_as_one_by_one() {
+    fn samples_probed_together_give_the_same_as_one_by_one() {
         let mut random = 3_u64;
         let mut next = || {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -293,11 +303,13 @@ mod tests {
                 let normals: Vec<[f32; 3]> = (0..n).map(|_| [next(), next(), next()]).collect();
                 let pose = Pose::rotation(Vector::new(0.1, 0.2, 0.3));
                 let of = |before: Probe, which: Range<usize>| {
-                    let samples = (&points[which.clone()], &normals[which]);
+                    let (points, normals) = (&points[which.clone()], &normals[which]);
+                    let samples = SurfaceSamples { points, normals };
                     probe(&eyes, before, samples, &pose, tolerance)
                 };
                 let together = of(Probe::default(), 0..n);
-                let each = one_by_one(&eyes, (&points, &normals), &pose, tolerance);
+                let samples = SurfaceSamples { points: &points, normals: &normals };
+                let each = one_by_one(&eyes, samples, &pose, tolerance);
                 assert_eq!(together, each);
                 // Judging a part and then the rest must give the same.
                 assert_eq!(of(of(Probe::default(), 0..n / 3), n / 3..n), together);

@@ -61,22 +61,23 @@ fn numbers(eight: &Eight) -> [u32; N_LANES] {
 struct VoxelPlane {
     eights: Vec<Eight>,
     /// For each group of eight voxels, whether any of them has a sample.
-    is_told: Vec<bool>,
+    has_sample: Vec<bool>,
 }
 
 impl VoxelPlane {
     fn new(n: usize) -> Self {
-        Self { eights: vec![NONE; n], is_told: vec![false; n] }
+        Self { eights: vec![NONE; n], has_sample: vec![false; n] }
     }
 
     fn line(&self, y: usize, n_eights: usize) -> PlaneRow<'_> {
         let row = y * n_eights..(y + 1) * n_eights;
-        (&self.eights[row.clone()], &self.is_told[row])
+        (&self.eights[row.clone()], &self.has_sample[row])
     }
 
     fn clear(&mut self) {
-        let told = self.is_told.iter_mut().zip(&mut self.eights).filter(|(is_told, _)| **is_told);
-        told.for_each(|(is_told, eight)| (*is_told, *eight) = (false, NONE));
+        let filled =
+            self.has_sample.iter_mut().zip(&mut self.eights).filter(|(has_sample, _)| **has_sample);
+        filled.for_each(|(has_sample, eight)| (*has_sample, *eight) = (false, NONE));
     }
 }
 
@@ -87,7 +88,7 @@ type PlaneRow<'a> = (&'a [Eight], &'a [bool]);
 struct VoxelRow<'a> {
     beyond2: f32,
     eights: &'a [Eight],
-    is_told: &'a [bool],
+    has_sample: &'a [bool],
 }
 
 /// A sample with the voxel that holds it.
@@ -189,7 +190,7 @@ impl Spread<'_> {
                     for seed in here {
                         let [px, py, pz] = self.points[seed.sample as usize];
                         let new = [px, py, pz, f32::from_bits(seed.sample + 1)].map(f32x8::splat);
-                        rows.is_told[at] |=
+                        rows.has_sample[at] |=
                             keep_nearer(middles, &new, &mut best[eight], &mut rows.eights[at]);
                     }
                 }
@@ -206,7 +207,7 @@ impl Spread<'_> {
             for eight in 0..self.n_eights {
                 if let Some(kept) = self.nearest(&lines, [eight, y, z]) {
                     let at = y * self.n_eights + eight;
-                    (plane.eights[at], plane.is_told[at]) = (kept, true);
+                    (plane.eights[at], plane.has_sample[at]) = (kept, true);
                 }
             }
         }
@@ -244,9 +245,9 @@ impl Spread<'_> {
             let beyond = (ring as f32 - 0.5).max(0.0) * self.grid.edge;
             let sides = [place.checked_sub(ring), (ring > 0).then_some(place + ring)];
             for at in sides.into_iter().flatten().filter(|at| *at < n) {
-                let (eights, is_told) = line(at);
-                if is_told.contains(&true) {
-                    lines.push(VoxelRow { beyond2: beyond * beyond, eights, is_told });
+                let (eights, has_sample) = line(at);
+                if has_sample.contains(&true) {
+                    lines.push(VoxelRow { beyond2: beyond * beyond, eights, has_sample });
                 }
             }
         }
@@ -265,16 +266,16 @@ impl Spread<'_> {
     #[inline]
     fn nearest(&self, lines: &[VoxelRow], place: [usize; 3]) -> Option<Eight> {
         let middles = self.middles_of(place);
-        let (mut best, mut kept, mut is_told) = (f32x8::splat(self.limit), NONE, false);
+        let (mut best, mut kept, mut has_sample) = (f32x8::splat(self.limit), NONE, false);
         for line in lines {
             if best.simd_le(f32x8::splat(line.beyond2)).all() {
                 break;
             }
-            if line.is_told[place[0]] {
-                is_told |= keep_nearer(middles, &line.eights[place[0]], &mut best, &mut kept);
+            if line.has_sample[place[0]] {
+                has_sample |= keep_nearer(middles, &line.eights[place[0]], &mut best, &mut kept);
             }
         }
-        is_told.then_some(kept)
+        has_sample.then_some(kept)
     }
 }
 

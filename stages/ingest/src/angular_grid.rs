@@ -1,5 +1,5 @@
-//! Directions in; angles about the axis that a scanner spins about out, and the regular grid of
-//! angles that they lie on.
+//! Converts directions to angles about the axis that a scanner rotates about, and finds the regular
+//! grid that these angles lie on.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// The points that were read of one scan.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Read {
-    /// Length of the mask, as far as the strips tell it.
+    /// Length of the mask as given by the strips.
     pub(crate) n_places: u64,
     /// Places in the mask.
     pub(crate) place: Vec<u64>,

@@ -17,13 +17,14 @@ pub(crate) struct OpenFile {
     pub(crate) known: Vec<bool>,
     /// For each scan: where the steps of its lattice come from.
     pub(crate) steps: Vec<StepSource>,
-    /// For each scan: where most of its points lie in the world, metres, where that could be told.
+    /// For each scan: bounds of most of its points in the world, metres; `None` if they are not
+    /// known.
     pub(crate) spreads: Vec<Option<Aabb>>,
 }
 
 impl OpenFile {
-    /// What came of reading, if the file was whole all along: one that was cut short reads as zeros
-    /// from there, and that it was goes before what its reader makes of them.
+    /// Returns the result of a read, or the error that the file was truncated meanwhile. A
+    /// truncated file reads as zeros, so that its error goes before that of the reader.
     pub(crate) fn whole<T>(&self, read: Result<T>) -> Result<T> {
         self.reader.check().and(read)
     }

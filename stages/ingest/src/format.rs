@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-/// Number of bytes that are looked at, enough for the first lines of a text format.
+/// Number of bytes that are read, enough for the first lines of a text format.
 const HEAD_BYTES: u64 = 512;
 /// Bits of the point format in a LAS header that mark compressed points.
 const COMPRESSED: u8 = 0b1100_0000;

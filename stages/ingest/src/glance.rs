@@ -1,5 +1,5 @@
-//! An open input in; some of its points, spread over it as well as its format lets, out: enough to
-//! guess what stands in a plant without reading all of it.
+//! Reads some points of an open input, spread over it as well as its format allows. They suffice to
+//! estimate the content of a plant without reading all points.
 
 use crate::file::OpenFile;
 use crate::reader::{Extent, FileReading, RawStrip, RawStrips, Want};

@@ -1,6 +1,6 @@
-//! LAS and LAZ files in (versions 1.0 to 1.4, point formats 0 to 10); scans and strips out. Points
-//! come as runs of records, as they lie in the file or from the decompressor; no object is made for
-//! a point.
+//! Reads scans and points of LAS and LAZ files (versions 1.0 to 1.4, point formats 0 to 10). Points
+//! are read as runs of records, from the file or from the decompressor, without an object for each
+//! point.
 
 use crate::las_record::Decoder;
 use crate::las_runs::{LasRecords, at_once};

@@ -196,8 +196,8 @@ impl Decoder {
         }
     }
 
-    /// The same for a whole block of records, in loops without branches; false, and nothing done,
-    /// where one of them is withheld or not to be believed.
+    /// Like adding records one by one, but for a whole block, in loops without branches. Returns
+    /// false and adds nothing if a record of the block is withheld or implausible.
     fn add_block(
         &self,
         strip: &mut RawStrip,

@@ -1,5 +1,4 @@
-//! The path of a LAS or LAZ file in; runs of its records out, as they lie in the file or from the
-//! decompressor.
+//! Reads the point records of a LAS or LAZ file in runs, from the file or from the decompressor.
 
 use crate::las_header::LasHeader;
 use crate::laz::Laz;
@@ -11,13 +10,13 @@ use contract::Result;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Largest run of records that is decompressed from a stream at once, bytes: of usual records, more
-/// than a strip.
+/// Largest run of records that is decompressed from a stream at once, bytes. It holds more than a
+/// strip of usual records.
 const RUN_BYTES: usize = 16 << 20;
 
-/// Records of this length that are decompressed from a stream at once. A stream does not say how
-/// many there really are, and a header may state records of 64 KiB, so that a strip of them would
-/// take gigabytes before the first was read.
+/// Number of records of this length that are decompressed from a stream at once. The length of a
+/// stream is not stated, and a header may state records of 64 KiB, so that a strip of them would
+/// take gigabytes.
 pub(crate) fn at_once(record_len: usize) -> usize {
     (RUN_BYTES / record_len.max(1)).max(1)
 }
@@ -27,14 +26,14 @@ pub(crate) struct LasRecords {
     pub(crate) map: Mapped,
     /// Header, checked, in metres.
     pub(crate) header: LasHeader,
-    /// Units of the file's own coordinates.
+    /// Units of the coordinates in the file.
     pub(crate) units: Units,
     /// How to decompress, where they are compressed.
     pub(crate) laz: Option<Laz>,
 }
 
 impl LasRecords {
-    /// Opens a file and checks what it says of itself.
+    /// Opens a file and checks its header.
     pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Self> {
         let map = map(path)?;
         let header = LasHeader::read(&map)?;
@@ -75,8 +74,8 @@ impl LasRecords {
         laz.pieces.get(laz.piece_of(first)).map_or(0, |p| p.first)
     }
 
-    /// Runs of records that can be read by themselves, of so many points where they are not
-    /// compressed, and all that lies between them; none where they are one stream.
+    /// Runs of records that can be read independently, with what lies between them: `n` points each
+    /// in uncompressed files; `None` if the records are one stream.
     pub(crate) fn extents(&self, n: usize) -> Option<Box<dyn Iterator<Item = Extent> + Send + '_>> {
         let (header, n_bytes) = (&self.header, self.map.len() as u64);
         let Some(laz) = &self.laz else {

@@ -40,8 +40,8 @@ pub(crate) struct FoundScans {
 
 impl Census {
     /// Estimated number of records of the whole file, of which `n` were seen in the sample.
-    fn likely(&self, n: u64, whole: (u64, u64)) -> u64 {
-        let all = (whole.1 + 1 - whole.0) as f64;
+    fn likely(&self, n: u64, n_records: u64) -> u64 {
+        let all = n_records as f64;
         (n as f64 / self.n_looked.max(1) as f64 * all) as u64
     }
 }
@@ -80,7 +80,7 @@ pub(crate) fn find(
 ) -> Result<FoundScans> {
     let header = &records.header;
     let look = look(records)?;
-    let whole = (0, header.n_points.saturating_sub(1));
+    let whole = whole_extent(header);
     let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     let mut notes = header.notes.clone();
     let step = crate::steps::coarse(&look.points);
@@ -122,22 +122,30 @@ pub(crate) fn find(
         found.extents.push(whole);
     } else {
         let census = census(records)?;
-        by_source_id(&mut found, scanners, &census, whole, &stem, seed);
+        by_source_id(&mut found, scanners, &census, header, &stem, seed);
     }
     found.scans.iter_mut().try_for_each(|scan| check_place(scan, &look, settings))?;
     Ok(found)
 }
 
+/// The first and last place of a file's records.
+fn whole_extent(header: &LasHeader) -> (u64, u64) {
+    (0, header.n_points.saturating_sub(1))
+}
+
+/// Makes a scan for each scanner that has points, and one for the points of all other sources.
 fn by_source_id(
     found: &mut FoundScans,
     scanners: &[LasScanner],
     census: &Census,
-    whole: (u64, u64),
+    header: &LasHeader,
     stem: &str,
     seed: impl Fn(String, Option<u16>, Option<Pose>) -> ScanSeed,
 ) {
     /// Marks ids without scanner until the index of the scan for the rest is known.
     const NONE: u16 = u16::MAX;
+    let whole = whole_extent(header);
+    let n_records = whole.1 + 1 - whole.0;
     let mut scan_of_source = vec![NONE; 1 << 16];
     for scanner in scanners {
         let Some(id) = scanner.source_id else {
@@ -150,7 +158,7 @@ fn by_source_id(
         scan_of_source[usize::from(id)] = found.scans.len() as u16;
         let name = scanner.name.clone().unwrap_or_else(|| format!("{stem} {id}"));
         let mut scan = seed(name, Some(id), Some(scanner.pose));
-        scan.likely_points = seen.map(|seen| census.likely(seen.2, whole));
+        scan.likely_points = seen.map(|seen| census.likely(seen.2, n_records));
         found.scans.push(scan);
         // Windows may miss the first and last points of a scan; the places between those seen are
         // enough for a sample.
@@ -227,7 +235,7 @@ pub(crate) fn grown(bounds: &Aabb, header: &LasHeader) -> Aabb {
     bounds.grown(0.01 * size[0].max(size[1]).max(size[2]) + 2.0 * scale)
 }
 
-/// What a sample of records says of where all points lie.
+/// The place of a scan's points, from a sample of records.
 struct LasLook {
     /// World coordinates, metres.
     points: Vec<[f64; 3]>,

@@ -55,8 +55,8 @@ impl Mapped {
         if self.watch.is_whole() && is_as_long {
             return Ok(());
         }
-        Err(Error::bad_input("the file was cut short or went away while it was read")
-            .hint("start again once it is whole"))
+        Err(Error::bad_input("the file was cut short or became unreadable while it was read")
+            .hint("start again when it is complete"))
     }
 
     /// Asks the operating system to read `n` bytes from `start` on ahead of their use. It is only

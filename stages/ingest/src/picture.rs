@@ -1,5 +1,5 @@
-//! Tells from a sample of neighbouring points whether a depth camera took them: a camera's pixels
-//! are evenly spaced on a plane in front of it, a scanner's beams are evenly spaced in angle.
+//! Recognises depth cameras from a sample of neighbouring points: a camera's pixels are evenly
+//! spaced on a plane in front of it, a scanner's beams are evenly spaced in angle.
 
 use crate::angular_grid::{Axis, wrap};
 use crate::reader::SampledPoint;
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cameras_pixels_are_told_from_a_scanners_beams() {
+    fn pixels_of_a_camera_are_distinguished_from_beams_of_a_scanner() {
         let tan = |k: i32| f64::from(k) * 0.004;
         let ahead = |i: i32, j: i32| [1.0, tan(j), tan(i)];
         assert!(is_picture(&sample(ahead)));

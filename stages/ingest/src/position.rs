@@ -1,4 +1,4 @@
-//! Tells from a scan's points whether the scanner can have stood at its stated position.
+//! Tests from a scan's points whether the scanner can have stood at its stated position.
 //!
 //! Each beam of a scanner returns once: in every direction from the scanner there is one surface,
 //! as dense as the beams. Seen from any other place, one surface lies in front of another, and both

@@ -1,6 +1,6 @@
-//! A sample of a scan's points in; the angular raster that suits it out: from native rows and
-//! columns where they are regular, else from the directions of the points. Never finer than about
-//! one point a pixel.
+//! Estimates the angular raster of a scan from a sample of its points: from native rows and columns
+//! if they are regular, otherwise from the directions of the points. The raster is at most so fine
+//! that a pixel holds about one point.
 
 use crate::angular_grid::{AngularGrid, wrap};
 

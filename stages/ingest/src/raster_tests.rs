@@ -153,7 +153,7 @@ fn directions_alone_give_steps_and_phase() {
 }
 
 #[test]
-fn rows_that_run_round_are_told_from_columns() {
+fn rows_about_the_axis_are_distinguished_from_columns() {
     let mut points = plain(&PLAIN.points());
     let elevation = |p: &SampledPoint| Axis::Z.angles(p.xyz)[1];
     points.sort_by(|a, b| {

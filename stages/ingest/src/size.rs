@@ -35,10 +35,10 @@ impl Sources {
             let of = |is_wrong: fn(&[f64; 3]) -> bool| file.sizes().find(is_wrong);
             match (of(is_vast), file.largest()) {
                 (Some(size), _) if is_bare => {
-                    Err(wrong(input, units, &size, "no plant is that large"))
+                    Err(wrong(input, units, &size, "no plant is this large"))
                 }
                 (_, Some(size)) if diagonal(&size) < SMALLEST => {
-                    Err(wrong(input, units, &size, "no robot cell is that small"))
+                    Err(wrong(input, units, &size, "no robot cell is this small"))
                 }
                 _ => Ok(()),
             }
@@ -107,7 +107,7 @@ impl Sources {
             let vast = file.sizes().find(is_vast);
             let vast = vast.filter(|_| units.origin == Origin::Declared).map(|size| {
                 format!(
-                    "{path}: points spread over {}, in {units}: no plant is that large",
+                    "{path}: points spread over {}, in {units}: no plant is this large",
                     words(&size)
                 )
             });

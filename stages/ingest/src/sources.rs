@@ -1,5 +1,5 @@
-//! Paths in; open inputs out, numbered over all of them: inputs, masks, scans with their lattices,
-//! and the strips of each input on request.
+//! Opens inputs by their paths and numbers their masks and scans across all inputs. Gives the
+//! lattice of each scan, and the strips of each input on request.
 
 use crate::file::OpenFile;
 

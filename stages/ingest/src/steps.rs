@@ -49,7 +49,7 @@ fn step(mut values: Vec<f64>) -> Option<f64> {
 /// The message about a coarse step.
 pub(crate) fn note(step: f64) -> String {
     format!(
-        "coordinates come in steps of {}: surfaces and robots are not found better than that; export them in double \
+        "coordinates come in steps of {}: surfaces and robots are not located more precisely; export them in double \
          precision, or about an origin near the plant",
         length(step)
     )

@@ -1,4 +1,5 @@
-//! A tile in; its raster out, filled with the nearest returns, linked, and without veils.
+//! Fills the raster of a tile with the nearest return of each pixel, links neighbouring pixels, and
+//! removes veil points.
 
 use crate::Settings;
 use crate::links;
@@ -57,7 +58,8 @@ impl TileRaster {
 }
 
 /// Which points of `tile` are veils (mixed pixels between a near edge and what lies behind), in the
-/// order of the tile's points. All `false` where the scan has no lattice: then nobody can tell.
+/// order of the tile's points. All are `false` if the scan has no lattice, since veil points cannot
+/// be recognised then.
 #[must_use]
 pub fn veils(tile: &Tile, scan: &contract::Scan, settings: &Settings) -> Vec<bool> {
     let mut out = vec![false; tile.len()];

@@ -1,5 +1,5 @@
-//! A tile in, a dense raster out: nearest return of each pixel, its range, its links to neighbours,
-//! its veils.
+//! The dense raster of a tile: nearest return of each pixel, its range, its links to neighbours,
+//! and whether it is a veil point.
 
 use crate::noise::RangeNoise;
 use contract::{Lattice, Tile};

@@ -1,5 +1,5 @@
-//! A tile in; the normal of each of its points out: from its raster where the scanner is known,
-//! else from voxels.
+//! Computes the normal at each point of a tile: from its raster if the scanner's position is known,
+//! otherwise from voxels.
 
 use crate::{LatticeScratch, Settings, voxels};
 use contract::{Scan, Tile};

@@ -158,7 +158,7 @@ impl ViewBuilder {
         }
     }
 
-    /// Keeps those of a few points that lie in the region.
+    /// Keeps the points that lie in the region.
     fn keep(&mut self, local: &Lanes, places: &[u32], first_place: u64) {
         for (i, place) in places.iter().enumerate() {
             let p = [local[0][i], local[1][i], local[2][i]];

@@ -1,9 +1,9 @@
-//! Surfaces that stood still, as the plant has them, and points of a new scan in; how far the scan
-//! is off them out.
+//! Registers a new scan to the planes of an earlier session: the rigid motion that brings the
+//! scan's points onto surfaces that did not move, with its uncertainty.
 //!
-//! Points are compared with planes through the plant's own points, voxel by voxel: point-to-plane
-//! distances (Chen and Medioni 1992), one for each voxel, so that a dense wall counts no more than
-//! it covers, with Tukey weights, so that what was moved between the sessions counts nothing.
+//! Residuals are point-to-plane distances (Chen and Medioni 1992). Planes come from the plant's
+//! points, one for each voxel. Each voxel has one residual, so that a densely sampled wall counts
+//! by its area only. Tukey weights suppress surfaces that moved between the sessions.
 #![forbid(unsafe_code)]
 
 use geometry::{Moments, Plane, Point, Pose, Vector};
@@ -11,61 +11,66 @@ use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};
 use rustc_hash::FxHashMap;
 use std::collections::hash_map::Entry;
 
-/// Edge of a voxel, metres: a hundred points of a common scan, and still flat where a machine is.
+/// Edge of a voxel, metres: large enough for a hundred points of a common scan, small enough that
+/// the surface of a machine is flat within it.
 const EDGE: f64 = 0.10;
-/// Where voxels begin, metres: floors and walls stand at round figures, and must not run along
-/// their borders.
+/// Offset of the voxel grid, metres. Floors and walls often lie at round coordinates and must not
+/// lie on the borders of voxels.
 const BEGIN: f64 = 0.0371;
-/// A plane is made of this many points and has at most this RMS distance from them, metres.
+/// Fewest points of a plane, and its largest RMS distance from them, metres.
 const MIN_POINTS: f64 = 12.0;
 const MAX_RMS: f64 = 0.008;
-/// A plane whose points lie on a line is none: least spread across it, metres.
+/// Least spread of a plane's points across their main direction, metres. Points on a line give no
+/// plane.
 const MIN_SPREAD: f64 = 0.012;
-/// Points farther from a plane are of something else, metres: more than sessions are off each
-/// other.
+/// Points farther from a plane than this belong to another surface, metres. Sessions differ by
+/// less.
 const GATE: f64 = 0.05;
-/// Fewest points of the new scan in a voxel.
+/// Fewest points of the new scan in a voxel that gives a residual.
 const MIN_NEW: usize = 3;
-/// Fewest voxels that tell a scan's place.
+/// Fewest voxels with residuals that determine a registration.
 const MIN_CELLS: usize = 50;
-/// Standard deviations that are expected of a scan's place before it is looked at: metres, radians.
+/// Prior standard deviations of a scan's registration: shift in metres, rotation in radians.
 const PRIOR: [f64; 2] = [0.02, 0.003];
-/// Most rounds of weights.
+/// Limit of iterations; each computes the weights anew.
 const ROUNDS: usize = 12;
-/// A step this small ends it: metres, radians. A micrometre is a hundredth of what is known of the
-/// shift.
+/// Iterations end at a step smaller than this, metres and radians: a hundredth of the uncertainty
+/// of the shift.
 const SETTLED: f64 = 1e-6;
-/// Tukey's constant, and the median's ratio to a standard deviation.
+/// Tukey's tuning constant, and the standard deviation of normal deviates by their median absolute
+/// value.
 const TUKEY: f64 = 4.685;
 const FROM_MEDIAN: f64 = 1.4826;
 
-/// Points of a plant by voxel. Nothing depends on the order of the voxels.
+/// The moments of a plant's points in each voxel. No result depends on the order of the voxels.
 #[derive(Debug, Clone, Default)]
 pub struct SurfaceVoxels {
     cells: FxHashMap<[i32; 3], Moments>,
 }
 
-/// The planes through them, where they are flat.
+/// The planes of the voxels whose points are flat.
 #[derive(Debug, Clone)]
 pub struct Planes {
     cells: FxHashMap<[i32; 3], Plane>,
 }
 
-/// How far a scan is off the plant.
+/// The registration of a scan to a plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Registration {
-    /// Brings the scan's world into the plant's.
+    /// The motion from the scan's stated world frame to the plant's frame.
     pub plant_from_stated: Pose,
-    /// Standard deviation of the shift about the middle of the cell, metres, and of the turn,
-    /// radians, axis by axis.
+    /// Standard deviations of the shift in x, y, z at the centre of rotation, metres, and of the
+    /// rotation about x, y, z, radians.
     pub sigma: [f64; 6],
-    /// Voxels that it is told by.
+    /// Number of voxels with residuals.
     pub n_surfaces: usize,
-    /// RMS distance from the plant's planes before and after, metres.
+    /// Robust standard deviation of the distances from the plant's planes, before and after,
+    /// metres.
     pub rms: [f64; 2],
 }
 
-/// What one voxel says: distance, normal and place of the new points in it.
+/// The residual of one voxel: mean distance of the new points from its plane, normal of the plane,
+/// and mean of the points, metres. While points are added these are sums.
 struct VoxelResidual {
     distance: f64,
     normal: Vector,
@@ -73,14 +78,14 @@ struct VoxelResidual {
 }
 
 impl SurfaceVoxels {
-    /// Adds a point, world, metres.
+    /// Adds a point, world frame, metres.
     pub fn add(&mut self, p: [f64; 3]) {
         let cell = cell(&p);
         let middle = Vector::from(cell.map(|i| (f64::from(i) + 0.5) * EDGE + BEGIN));
         self.cells.entry(cell).or_insert_with(|| Moments::new(middle)).add(&p.into());
     }
 
-    /// Adds those of others.
+    /// Adds all points of another set.
     pub fn join(&mut self, other: Self) {
         other.cells.into_iter().for_each(|(cell, moments)| match self.cells.entry(cell) {
             Entry::Vacant(slot) => drop(slot.insert(moments)),
@@ -88,7 +93,7 @@ impl SurfaceVoxels {
         });
     }
 
-    /// Those that are planes.
+    /// The planes of the voxels that have enough points and are flat.
     #[must_use]
     pub fn planes(&self) -> Planes {
         let flat = self.cells.iter().filter_map(|(cell, moments)| {
@@ -101,22 +106,23 @@ impl SurfaceVoxels {
 }
 
 impl Planes {
-    /// The rigid motion that lays points of a scan (its stated world, metres) on the planes, turned
-    /// about `about`; `None` where too few of them lie on any.
+    /// The rigid motion that brings points of a scan (its stated world frame, metres) onto the
+    /// planes. `about` is the centre of rotation, world frame. `None` if fewer than 50 voxels have
+    /// residuals, or if the normal equations are singular.
     #[must_use]
     pub fn register(&self, points: &[[f64; 3]], about: &Point) -> Option<Registration> {
         let (mut pose, mut sigma, mut rms) = (Pose::identity(), [0.0; 6], [None; 2]);
         let mut n_surfaces = 0;
         for _ in 0..ROUNDS {
-            let told = told(&self.cells, points, &pose);
-            if told.len() < MIN_CELLS {
+            let residuals = voxel_residuals(&self.cells, points, &pose);
+            if residuals.len() < MIN_CELLS {
                 return None;
             }
-            let scale = scale(&told);
-            let step = solve(&told, scale, about, &total(&pose, about))?;
+            let scale = scale(&residuals);
+            let step = solve(&residuals, scale, about, &total(&pose, about))?;
             rms[0] = rms[0].or(Some(scale));
             rms[1] = Some(scale);
-            n_surfaces = told.len();
+            n_surfaces = residuals.len();
             sigma = step.1;
             pose = motion(&step.0, about) * pose;
             if step.0.amax() < SETTLED {
@@ -132,78 +138,82 @@ fn cell(p: &[f64; 3]) -> [i32; 3] {
     p.map(|v| ((v - BEGIN) / EDGE).floor() as i32)
 }
 
-/// A motion by shift and turn about a place.
+/// The rigid motion of a step: shift (metres) and rotation vector (radians) about a centre.
 fn motion(step: &Vector6<f64>, about: &Point) -> Pose {
     let turn = UnitQuaternion::from_scaled_axis(Vector::new(step[3], step[4], step[5]));
     let shift = Vector::new(step[0], step[1], step[2]);
     Pose::from_parts(Translation3::from(about.coords + shift - turn * about.coords), turn)
 }
 
-/// Shift at a place and turn of a motion.
+/// The shift of a centre (metres) and the rotation vector (radians) of a motion: the inverse of
+/// `motion`.
 fn total(pose: &Pose, about: &Point) -> Vector6<f64> {
     let (shift, turn) = (pose * about - about, pose.rotation.scaled_axis());
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-fn told(
+/// The residuals of the voxels at a pose, in the order in which points reach them.
+fn voxel_residuals(
     planes: &FxHashMap<[i32; 3], Plane>,
     points: &[[f64; 3]],
     pose: &Pose,
 ) -> Vec<VoxelResidual> {
-    // Neighbours among the points are mostly in one voxel, and ask once for its plane and its place
-    // among the sums.
+    // Consecutive points mostly lie in the same voxel, so that its plane and its sums are looked up
+    // only once for them.
     let mut sums: FxHashMap<[i32; 3], usize> = FxHashMap::default();
-    let mut told: Vec<(usize, VoxelResidual)> = Vec::new();
-    let (mut last, mut known): (Option<[i32; 3]>, Option<(&Plane, usize)>) = (None, None);
+    let mut residuals: Vec<(usize, VoxelResidual)> = Vec::new();
+    let (mut last, mut current): (Option<[i32; 3]>, Option<(&Plane, usize)>) = (None, None);
     for p in points {
         let p = (pose * Point::from(*p)).coords;
         let cell = cell(&p.into());
         if last != Some(cell) {
             last = Some(cell);
-            known = planes.get(&cell).map(|plane| {
+            current = planes.get(&cell).map(|plane| {
                 let at = *sums.entry(cell).or_insert_with(|| {
                     let (normal, at) = (plane.normal, Vector::zeros());
-                    told.push((0, VoxelResidual { distance: 0.0, normal, at }));
-                    told.len() - 1
+                    residuals.push((0, VoxelResidual { distance: 0.0, normal, at }));
+                    residuals.len() - 1
                 });
                 (plane, at)
             });
         }
-        let Some((plane, at)) = known else { continue };
+        let Some((plane, at)) = current else { continue };
         let distance = plane.distance(&p);
         if distance.abs() < GATE {
-            let (n, sum) = &mut told[at];
+            let (n, sum) = &mut residuals[at];
             *n += 1;
             sum.distance += distance;
             sum.at += p;
         }
     }
-    let many = told.into_iter().filter(|(n, _)| *n >= MIN_NEW);
+    let supported = residuals.into_iter().filter(|(n, _)| *n >= MIN_NEW);
     let mean = |(n, sum): (usize, VoxelResidual)| VoxelResidual {
         distance: sum.distance / n as f64,
         at: sum.at / n as f64,
         ..sum
     };
-    many.map(mean).collect()
+    supported.map(mean).collect()
 }
 
-/// Robust standard deviation of what the voxels say, metres.
-fn scale(told: &[VoxelResidual]) -> f64 {
-    let mut all: Vec<f64> = told.iter().map(|t| t.distance.abs()).collect();
+/// Robust standard deviation of the residuals, metres.
+fn scale(residuals: &[VoxelResidual]) -> f64 {
+    let mut all: Vec<f64> = residuals.iter().map(|t| t.distance.abs()).collect();
     let middle = all.len() / 2;
     let (_, median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
     (FROM_MEDIAN * *median).max(1e-4)
 }
 
-/// The next step of shift and turn, and standard deviations.
+/// Solves the weighted normal equations for one Gauss-Newton step: shift and rotation vector about
+/// the centre, and their standard deviations. `total` is the motion so far, which the prior draws
+/// to zero.
 fn solve(
-    told: &[VoxelResidual],
+    residuals: &[VoxelResidual],
     scale: f64,
     about: &Point,
     total: &Vector6<f64>,
 ) -> Option<(Vector6<f64>, [f64; 6])> {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
-    for t in told {
+    for t in residuals {
         let u = t.distance / (TUKEY * scale);
         if u.abs() >= 1.0 {
             continue;
@@ -245,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_that_is_off_is_brought_back() {
+    fn a_shifted_scan_is_registered() {
         let mut surfaces = SurfaceVoxels::default();
         room(0.0).iter().for_each(|p| surfaces.add(*p));
         let about = Point::new(1.5, 1.5, 1.0);

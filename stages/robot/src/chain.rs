@@ -39,7 +39,7 @@ pub(crate) fn main_chain(tree: &LinkTree, sheet: &Sheet, findings: &mut Findings
         return path(tree, root, tip).unwrap_or_else(|| {
             findings.fail(
                 "robot.toml: main_chain",
-                "the tip does not hang on the root",
+                "the tip is not connected to the root",
                 "name two links of one chain",
             );
             Vec::new()

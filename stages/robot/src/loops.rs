@@ -1,5 +1,6 @@
-//! Closed loops: values of the other joints in, values of the passive joints out; planar four-bars,
-//! cylinders and bars in closed form, anything else by Newton's method from the zero posture.
+//! Solves closed loops: the values of passive joints from those of the other joints. Planar
+//! four-bars, cylinders and bars are solved in closed form, all others by Newton's method from the
+//! zero posture.
 
 use crate::closed_loop::{ClosedLoop, Closure, Form};
 

@@ -1,4 +1,4 @@
-//! Applies what `robot.toml` says of passive joints, symmetries and single links.
+//! Applies the entries of `robot.toml` about passive joints, symmetries and single links.
 
 use crate::close;
 use crate::finding::Findings;
@@ -43,7 +43,7 @@ pub(crate) fn named_passive(
     Some(named)
 }
 
-/// Applies what `robot.toml` says of single links.
+/// Applies the entries of `robot.toml` about single links.
 pub(crate) fn note_links(model: &mut Model, sheet: &Sheet, findings: &mut Findings) {
     for note in &sheet.link {
         let place = format!("robot.toml: link {}", note.name);
@@ -74,7 +74,7 @@ pub(crate) fn note_links(model: &mut Model, sheet: &Sheet, findings: &mut Findin
             } else {
                 findings.fail(
                     &place,
-                    format!("mesh_sigma is no length \"{sigma}\""),
+                    format!("mesh_sigma is not a length in metres \"{sigma}\""),
                     "write metres",
                 );
             }

@@ -21,7 +21,7 @@ pub(crate) fn read_bytes(
 ) -> std::result::Result<Vec<u8>, String> {
     // Reading a pipe would wait for ever for a writer, and a device may have no end.
     if path.metadata().is_ok_and(|meta| !meta.is_file()) {
-        return Err("is no regular file, and nothing else is read".to_owned());
+        return Err("is not a regular file; only regular files are read".to_owned());
     }
     let open = || {
         let file = std::fs::File::open(path)?;

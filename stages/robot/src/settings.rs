@@ -1,4 +1,4 @@
-//! What is tuned about loading robots: limits on files, and how finely surfaces are sampled.
+//! The settings of loading robots: limits on files, and the density of surface samples.
 
 use contract::XmlLimits;
 

@@ -127,12 +127,12 @@ fn check_joints(
         }
         if matches!(joint.kind, T::Floating | T::Planar | T::Spherical) {
             let what =
-                format!("a joint type that is not followed \"{:?}\"", joint.kind).to_lowercase();
+                format!("a joint type that is not supported \"{:?}\"", joint.kind).to_lowercase();
             findings.fail(&place, what, "use revolute, continuous, prismatic or fixed");
         }
         let moving = joint.kind != T::Fixed;
         if moving && Vector::from(joint.axis).norm() < 1e-9 {
-            findings.fail(&place, "its axis has no direction", "give an axis such as \"0 0 1\"");
+            findings.fail(&place, "its axis has length zero", "give an axis such as \"0 0 1\"");
         }
         let follows = joint.mimic.is_some() || passive.contains_key(&joint.name);
         check_limits(joint, follows, &place, findings);
@@ -163,7 +163,7 @@ fn check_limits(joint: &RawJoint, follows: bool, place: &str, findings: &mut Fin
         }
         Some([lower, upper]) if lower == upper && !follows => findings.warn(
             place,
-            format!("its limits leave no way to move \"{lower}\""),
+            format!("its lower and upper limit are equal \"{lower}\""),
             "make it fixed",
         ),
         Some([lower, upper]) if joint.kind == T::Revolute && upper - lower > 100.0 => {

@@ -24,7 +24,7 @@ fn broken_urdfs_are_named() {
         (robot(&(two.clone() + &joint("j", "revolute", "a", "b", "0 nan 1", LIMIT))), "finite number"),
         (robot(&(two.clone() + &joint("j", "revolute", "a", "b", "0 x 1 1", LIMIT))), "finite number"),
         (robot(&(two.clone() + &joint("j", "revolute", "a", "b", "0 1", LIMIT))), "finite number"),
-        (moving(LIMIT).replace("0 1 0", "0 0 0"), "axis has no direction"),
+        (moving(LIMIT).replace("0 1 0", "0 0 0"), "axis has length zero"),
         (moving("<limit lower='1' upper='-1'/>"), "lower limit is above"),
         (moving("<limit lower='-180' upper='180'/>"), "look like degrees"),
         (moving("<mimic joint='x'/>"), "not there \"x\""),
@@ -301,7 +301,7 @@ fn pipes_and_devices_in_a_library_are_refused_at_once() {
     let folder = Folder::new().with("robot.urdf", robot(&arm(3)));
     let pipe = folder.path().join("robot.toml");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    says(&folder, "no regular file");
+    says(&folder, "not a regular file");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Fitted robots prepared for labelling: posed links with distance fields, gates and bounds.
 
-use crate::Settings;
 use crate::field::{DistanceField, FIELD_REACH};
+use crate::settings::Settings;
 use contract::{Fan, Fit, ScanId};
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{DMatrix, DVector};
@@ -44,7 +44,7 @@ impl StandingLink {
 pub(crate) struct StandingRobot {
     /// Index of its fit.
     pub(crate) robot: u16,
-    /// Scans in which it stands so; empty if it does in all.
+    /// Scans in which it has this posture; empty if it has it in all.
     stands_in: Vec<ScanId>,
     /// World bounds of all points that are examined, metres.
     pub(crate) region: Aabb,
@@ -52,7 +52,7 @@ pub(crate) struct StandingRobot {
 }
 
 impl StandingRobot {
-    /// Whether it stands so in a scan.
+    /// Whether it has this posture in a scan.
     pub(crate) fn is_in(&self, scan: ScanId) -> bool {
         self.stands_in.is_empty() || self.stands_in.contains(&scan)
     }

@@ -106,7 +106,7 @@ impl DistanceField {
         if rough > 2.75 * self.edge {
             return Err(rough);
         }
-        let (cell, mut best) = (self.cell(p), (f32::INFINITY, 0));
+        let (cell, mut best) = (self.cell(p), NearestSample::NONE);
         let gaps = self.gaps(p, cell);
         // A sample this far off cannot be nearer across the surface, even if the part along the
         // surface is ignored.
@@ -117,41 +117,41 @@ impl DistanceField {
         for (dy, dz) in ROWS {
             let (y, z) = (cell[1].wrapping_add_signed(dy), cell[2].wrapping_add_signed(dz));
             let aside = gap(gaps[1], dy) + gap(gaps[2], dz);
-            if y >= self.size[1] || z >= self.size[2] || is_beyond(aside, best.0) {
+            if y >= self.size[1] || z >= self.size[2] || is_beyond(aside, best.square) {
                 continue;
             }
             // Cells along x are adjacent in memory, so that up to three of them are one run of
             // samples.
             let row = (z * self.size[1] + y) * self.size[0];
-            let is_left = cell[0] > 0 && !is_beyond(aside + gaps[0][0], best.0);
-            let is_right = cell[0] + 1 < self.size[0] && !is_beyond(aside + gaps[0][1], best.0);
+            let is_left = cell[0] > 0 && !is_beyond(aside + gaps[0][0], best.square);
+            let is_right =
+                cell[0] + 1 < self.size[0] && !is_beyond(aside + gaps[0][1], best.square);
             let first = row + cell[0] - usize::from(is_left);
             let last = row + cell[0] + usize::from(is_right);
             let run = self.starts[first] as usize..self.starts[last + 1] as usize;
             best = self.nearest_of(p, run, best);
         }
-        if best.0.is_finite() {
-            Ok(NearestPlace { distance: best.0.sqrt(), normal: self.normals[best.1] })
+        if best.square.is_finite() {
+            Ok(NearestPlace { distance: best.square.sqrt(), normal: self.normals[best.index] })
         } else {
             Err(rough)
         }
     }
 
-    /// The nearest of a run of samples, if one is nearer than `best`: squared distance (m²) and
-    /// index.
-    fn nearest_of(&self, p: [f32; 3], run: Range<usize>, mut best: (f32, usize)) -> (f32, usize) {
+    /// The nearest of a run of samples, if one is nearer than `best`; otherwise `best`.
+    fn nearest_of(&self, p: [f32; 3], run: Range<usize>, mut best: NearestSample) -> NearestSample {
         let samples = self.points[run.clone()].iter().zip(&self.normals[run.clone()]);
         for (i, (point, n)) in run.zip(samples) {
             let d = minus(p, *point);
             let across = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
-            if across * across >= best.0 {
+            if across * across >= best.square {
                 continue;
             }
             let along = (square(d) - across * across).max(0.0).sqrt();
             let over = (along - self.tangent).max(0.0);
             let metric = across * across + over * over;
-            if metric < best.0 {
-                best = (metric, i);
+            if metric < best.square {
+                best = NearestSample { square: metric, index: i };
             }
         }
         best
@@ -196,6 +196,18 @@ fn gap(gaps: [f32; 2], side: isize) -> f32 {
 
 fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The nearest sample so far.
+#[derive(Debug, Clone, Copy)]
+struct NearestSample {
+    /// Squared distance, m².
+    square: f32,
+    index: usize,
+}
+
+impl NearestSample {
+    const NONE: Self = Self { square: f32::INFINITY, index: 0 };
 }
 
 fn square(v: [f32; 3]) -> f32 {
@@ -250,8 +262,11 @@ mod tests {
             let p = [a, b, c].map(|v| 0.017 * v as f32 - 0.13);
             let Ok(near) = field.near(p) else { continue };
             n_near += 1;
-            let best = field.nearest_of(p, 0..field.len(), (f32::INFINITY, 0));
-            assert!(near.distance <= best.0.sqrt() || best.0.sqrt() > field.edge, "{p:?}");
+            let best = field.nearest_of(p, 0..field.len(), NearestSample::NONE);
+            assert!(
+                near.distance <= best.square.sqrt() || best.square.sqrt() > field.edge,
+                "{p:?}"
+            );
         }
         assert!(n_near > 500, "{n_near}");
     }

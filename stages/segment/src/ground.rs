@@ -1,7 +1,7 @@
 //! The floor as dense rasters: gives the height above the floor and the default label of any place
 //! in constant time.
 
-use crate::Settings;
+use crate::settings::Settings;
 use contract::{Floor, FloorLevel, Label};
 use geometry::narrow::{floor_i32, local_f32};
 
@@ -164,7 +164,7 @@ impl HeightRaster {
                 }
             }
         }
-        self.known_height((i, j), (fu, fv))
+        self.known_height([i, j], [fu, fv])
     }
 
     /// Heights of two neighbours in a row, if both are known.
@@ -174,9 +174,12 @@ impl HeightRaster {
         Some([f64::from(pair[0]), f64::from(pair[1])])
     }
 
-    /// The height at the border of the known cells.
+    /// The height at the border of the known cells, from those of the four cells around a place
+    /// that are known: `cell` is the lowest of them, and `fraction` the place between their
+    /// centres, 0 to 1 along each axis.
     #[cold]
-    fn known_height(&self, (i, j): (i64, i64), (fu, fv): (f64, f64)) -> Option<f64> {
+    fn known_height(&self, cell: [i64; 2], fraction: [f64; 2]) -> Option<f64> {
+        let ([i, j], [fu, fv]) = (cell, fraction);
         let (mut sum, mut weight) = (0.0, 0.0);
         for (di, dj, w) in [
             (0, 0, (1.0 - fu) * (1.0 - fv)),

@@ -2,8 +2,9 @@
 
 use crate::body::{StandingRobot, bodies, box_distance};
 use crate::field::FIELD_REACH;
+use crate::ground::FloorHeights;
 use crate::raster::PixelRaster;
-use crate::{FloorHeights, Settings};
+use crate::settings::Settings;
 use contract::{
     Error, Fan, Fit, Floor, Kind, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE,
     ResidualVoxel, Result, Scan, Tile, TileLabels,
@@ -21,7 +22,7 @@ const MIN_AGREEMENT: f32 = 0.35;
 const NEAR_ENOUGH: f32 = 0.003;
 /// Distance from the border of a region within which a body may continue outside, metres.
 const BORDER: f32 = 0.03;
-/// Height above the floor below which a voxel stands on the floor, metres.
+/// Height above the floor below which a voxel counts as standing on the floor, metres.
 const GROUNDED: f64 = 0.06;
 /// Number of the eight neighbours on a link that assigns a doubtful point to the link.
 const PULL: usize = 4;

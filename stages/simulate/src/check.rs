@@ -33,7 +33,7 @@ impl Scene {
         let scene: Self = toml::from_str(text).map_err(|e| {
             Error::bad_input("scene cannot be read")
                 .because(e)
-                .hint("the words of a scene are in stages/simulate/README.md")
+                .hint("the keys of a scene file are listed in stages/simulate/README.md")
         })?;
         check(&scene)?;
         Ok(scene)

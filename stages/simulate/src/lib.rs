@@ -42,6 +42,7 @@ mod plant;
 mod plots;
 mod posture;
 pub mod random;
+mod rpy;
 mod scan;
 mod scanner;
 pub mod scene;

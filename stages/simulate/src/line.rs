@@ -26,7 +26,7 @@ pub struct ProductionLine {
     pub ends: Ends,
 }
 
-/// What tells the cells of a line apart.
+/// What differs between the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ends {
     /// Walls close to the first and the last cell.

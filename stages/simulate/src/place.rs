@@ -1,6 +1,6 @@
 //! Robots of a scene, as in a scene file: base pose, posture and tool.
 
-use crate::scene::pose;
+use crate::rpy::pose;
 use geometry::Pose;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

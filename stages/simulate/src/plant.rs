@@ -152,7 +152,7 @@ fn reach(model: &Model) -> f64 {
     all[all.len() * 3 / 4]
 }
 
-/// Adds everything that stands still.
+/// Adds everything that does not move.
 fn furnish(
     scene: &mut Scene,
     wanted: &Plant,
@@ -276,7 +276,7 @@ fn stuff(scene: &mut Scene, size: [f64; 2], n: usize, random: &mut Random) {
     }
 }
 
-/// Adds a person who stands still.
+/// Adds a person who does not move.
 fn person(scene: &mut Scene, name: &str, [x, y]: [f64; 2], random: &mut Random) {
     let ground = scene.ground(x, y);
     let yaw = random.between(0.0, 360.0);

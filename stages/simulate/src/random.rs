@@ -1,10 +1,10 @@
-//! Seeds and counters in, reproducible random numbers out. Knows no scenes.
+//! Reproducible random numbers from seeds and counters.
 //!
-//! The generator is SplitMix64 of `rand_xoshiro`: its sequence is fixed by its definition, so that
-//! a seed draws the same scene with every version of the library. What is made of its bits stays
-//! here for the same reason: the distributions of `rand` and `rand_distr` may change what they draw
-//! from the same bits (their value-stability policy allows it in a major version), and their normal
-//! deviates take a varying number of bits.
+//! The generator is SplitMix64 of `rand_xoshiro`. Its sequence is fixed by its definition, so that
+//! a seed gives the same scene with every version of the library. The conversion of its bits to
+//! numbers is written here for the same reason: the distributions of `rand` and `rand_distr` may
+//! change what they draw from the same bits (their value-stability policy allows it in a major
+//! version), and their normal deviates consume a varying number of bits.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::SplitMix64;

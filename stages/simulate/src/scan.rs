@@ -98,7 +98,8 @@ impl Station {
                     here.get(row + 1),
                 ];
                 let stated = self.stated(row, col);
-                let answer = self.measure(beams, surfaces, (row, col), &here[row], neighbours);
+                let answer =
+                    self.measure(beams, surfaces, BeamAt { row, col }, &here[row], neighbours);
                 out.push(answer, &stated);
             }
             before = std::mem::replace(&mut here, after);
@@ -147,17 +148,19 @@ impl Station {
             .collect()
     }
 
+    /// The return of a beam, whose four neighbours tell whether it hits an edge; `None` if it has
+    /// none.
     fn measure(
         &self,
         beams: &Beams,
         surfaces: &[BodySurface],
-        (row, col): (usize, u32),
+        at: BeamAt,
         beam: &SceneBeam,
         neighbours: [Option<&SceneBeam>; 4],
     ) -> Option<Return> {
         let (hit, range, is_mixed) = match &self.scanner.mixed {
             Some(mixed) if self.is_edge(beams, surfaces, beam, neighbours) => {
-                self.mix(beams, mixed, (row, col), beam, neighbours)?
+                self.mix(beams, mixed, at, beam, neighbours)?
             }
             _ => {
                 let hit = beam.hit?;
@@ -169,7 +172,7 @@ impl Station {
         }
         let surface = &surfaces[hit.surface as usize];
         let cosine = beams.cosine(hit.triangle, &beam.along);
-        let mut random = self.random(row, col, 0);
+        let mut random = self.random(at.row, at.col, 0);
         let lost = self.scanner.dropouts
             + if surface.reflectance < BLACK {
                 self.scanner.dark_dropouts * (1.0 - cosine)
@@ -225,7 +228,7 @@ impl Station {
         &self,
         beams: &Beams,
         mixed: &Mixed,
-        (row, col): (usize, u32),
+        at: BeamAt,
         beam: &SceneBeam,
         neighbours: [Option<&SceneBeam>; 4],
     ) -> Option<(BeamHit, f64, bool)> {
@@ -235,7 +238,7 @@ impl Station {
             .or_else(|| neighbours.into_iter().flatten().filter_map(seen).min_by(f64::total_cmp))?;
         let radius = (mixed.radius + mixed.divergence * near) * RING / near.max(0.1);
         let (u, v) = across(&beam.along);
-        let phase = self.random(row, col, 2).unit();
+        let phase = self.random(at.row, at.col, 2).unit();
         let ring = mixed.sub_beams.saturating_sub(1);
         let mut parts: Vec<BeamHit> = beam.hit.into_iter().collect();
         for k in 0..ring {
@@ -266,6 +269,13 @@ impl Station {
         let spread = group[group.len() - 1].range - group[0].range;
         Some((*nearest, mean, spread > MIXED_SPREAD))
     }
+}
+
+/// Row and column of a beam in the raster.
+#[derive(Debug, Clone, Copy)]
+struct BeamAt {
+    row: usize,
+    col: u32,
 }
 
 /// A thin beam in the scene.

@@ -190,7 +190,7 @@ impl Scanner {
     /// `BadInput` if the quaternion is not of unit length to 1 %.
     pub fn world_from_scan(&self) -> Result<Pose> {
         let turn = match self.quaternion_wxyz {
-            None => return Ok(crate::scene::pose(self.position, self.rpy_deg)),
+            None => return Ok(crate::rpy::pose(self.position, self.rpy_deg)),
             Some([w, x, y, z]) => Quaternion::new(w, x, y, z),
         };
         // 1 % is more than rounding in a file, and less than a mistake.
@@ -208,7 +208,7 @@ impl Scanner {
     /// # Errors
     /// As [`Scanner::world_from_scan`].
     pub fn stated_world_from_scan(&self) -> Result<Pose> {
-        let error = crate::scene::pose(self.registration.xyz, self.registration.rpy_deg);
+        let error = crate::rpy::pose(self.registration.xyz, self.registration.rpy_deg);
         Ok(self.world_from_scan()? * error)
     }
 }

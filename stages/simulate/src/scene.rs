@@ -2,11 +2,10 @@
 //! files are opened; robot models are given by name.
 
 use contract::{Error, Result};
-use geometry::{Pose, Vector};
-use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 pub use crate::place::{Later, RobotPlace, Tool, ToolShape};
+pub use crate::rpy::pose;
 pub use crate::scanner::{BeamRaster, Mixed, RegistrationError, Scanner};
 
 /// A scene. Lengths are in metres, angles in degrees where a name ends in `_deg`; z of the world
@@ -23,7 +22,7 @@ pub struct Scene {
     /// The building; without it there are only floor and sky.
     #[serde(default)]
     pub hall: Option<Building>,
-    /// The ground; without it there is none.
+    /// The ground; `None` for a scene without ground.
     #[serde(default)]
     pub floor: Option<SceneFloor>,
     /// Boxes.
@@ -339,16 +338,6 @@ impl SceneFloor {
             + 0.4 * (1.37 * k * (0.8 * x - 0.6 * y)).sin();
         tilt[0] * x + tilt[1] * y + self.wave_amplitude * waves
     }
-}
-
-/// A pose from a position (metres) and roll, pitch, yaw about the fixed axes x, y, z (degrees).
-#[must_use]
-pub fn pose(xyz: [f64; 3], rpy_deg: [f64; 3]) -> Pose {
-    let [r, p, y] = rpy_deg.map(f64::to_radians);
-    Pose::from_parts(
-        Translation3::from(Vector::from(xyz)),
-        UnitQuaternion::from_euler_angles(r, p, y),
-    )
 }
 
 fn yes() -> bool {

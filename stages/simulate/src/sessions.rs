@@ -122,30 +122,42 @@ fn free(
             [edge - 0.5 * size[0], at[1] + along]
         };
         let inside = (0..2).all(|i| p[i].abs() < 0.5 * size[i] - 0.65);
-        let scanners = scene.scanners.iter().map(|s| ([s.position[0], s.position[1]], 0.0));
-        let taken_up = scanners.chain(taken.iter().map(|xy| (*xy, 0.45)));
+        let scanners =
+            scene.scanners.iter().map(|s| Disc { xy: [s.position[0], s.position[1]], radius: 0.0 });
+        let taken_up = scanners.chain(taken.iter().map(|xy| Disc { xy: *xy, radius: 0.45 }));
         if inside && !things(scene).chain(taken_up).any(|thing| is_near(p, thing, FREE)) {
             taken.push(p);
             return Ok(p);
         }
     }
-    Err(no_room("what is to be moved"))
+    Err(no_room("the object to be moved"))
 }
 
-/// Centre and half of the largest horizontal extent of each object of a scene, metres.
-fn things(scene: &Scene) -> impl Iterator<Item = ([f64; 2], f64)> + '_ {
+/// A disc on the ground, metres.
+#[derive(Debug, Clone, Copy)]
+struct Disc {
+    xy: [f64; 2],
+    radius: f64,
+}
+
+/// The smallest disc that contains each object of a scene.
+fn things(scene: &Scene) -> impl Iterator<Item = Disc> + '_ {
     let boxes = scene.boxes.iter();
-    let boxes = boxes.map(|b| ([b.xyz[0], b.xyz[1]], 0.5 * b.size[0].hypot(b.size[1])));
-    boxes.chain(scene.columns.iter().map(|c| (c.xy, c.radius)))
+    let boxes = boxes.map(|b| {
+        let radius = 0.5 * b.size[0].hypot(b.size[1]);
+        Disc { xy: [b.xyz[0], b.xyz[1]], radius }
+    });
+    boxes.chain(scene.columns.iter().map(|c| Disc { xy: c.xy, radius: c.radius }))
 }
 
-fn is_near(p: [f64; 2], (xy, half): ([f64; 2], f64), room: f64) -> bool {
-    (p[0] - xy[0]).hypot(p[1] - xy[1]) < room + half
+/// Whether a place is less than `room` metres away from the edge of a disc.
+fn is_near(p: [f64; 2], disc: Disc, room: f64) -> bool {
+    (p[0] - disc.xy[0]).hypot(p[1] - disc.xy[1]) < room + disc.radius
 }
 
 /// Whether a place has space for a tripod.
 fn is_free(scene: &Scene, xy: [f64; 2]) -> bool {
-    let robots = scene.robots.iter().map(|r| ([r.xyz[0], r.xyz[1]], ROBOT));
+    let robots = scene.robots.iter().map(|r| Disc { xy: [r.xyz[0], r.xyz[1]], radius: ROBOT });
     let furniture = scene.benches.iter().chain(&scene.conveyors).map(|f| {
         let (sin, cos) = f.yaw_deg.to_radians().sin_cos();
         let (x, y) = (xy[0] - f.xy[0], xy[1] - f.xy[1]);

@@ -153,7 +153,7 @@ fn columns_are_the_same_however_they_are_split() {
 }
 
 #[test]
-fn labels_tell_links_hoses_floor_and_hall_apart() {
+fn labels_distinguish_links_hoses_floor_and_hall() {
     let mut scene = busy();
     scene.scanners = vec![Scanner { mixed: Some(Mixed::default()), ..exact(0.2) }];
     scene.robots[0].posture.insert("turn".into(), 1.0);

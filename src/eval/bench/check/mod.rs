@@ -199,7 +199,7 @@ fn nearest(result: &ResultFile, scene: &Scene, robot: usize) -> Result<usize> {
 fn contacts(report: &PathReport) -> Vec<String> {
     let words = |c: &clearance::Contact| {
         let as_found = if c.as_found { ", as found" } else { "" };
-        let hangs = if c.hangs { " (hangs)" } else { "" };
+        let hangs = if c.is_attached { " (hangs)" } else { "" };
         let place = c.at.map_or(String::new(), |at| {
             let [x, y, z] =
                 (report.world_from_base * at).coords.map(|v| (v * 1e3).round() * 1e-3).into();

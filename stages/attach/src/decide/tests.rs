@@ -108,7 +108,7 @@ fn a_hose_to_the_floor_is_cut_and_a_touched_wall_is_not_lost() {
 }
 
 #[test]
-fn what_touches_the_base_or_nothing_is_fixed() {
+fn voxels_that_touch_only_the_base_or_nothing_are_fixed() {
     let box_on_base: Vec<_> = (0..10).map(|z| voxel([0, 0, z], 0, z)).collect();
     let alone: Vec<_> = (0..10).map(|z| voxel([50, 0, z], 1, z + 10)).collect();
     let out = attached(&[box_on_base, alone]);
@@ -126,7 +126,7 @@ fn a_cable_between_base_and_arm_is_shared() {
 }
 
 #[test]
-fn cut_anywhere_the_answer_is_the_same() {
+fn the_result_does_not_depend_on_the_order_of_parts() {
     let attach = Attach::new(&[fit()], &[model()], Settings::default());
     let part = |k: i32| -> Vec<ResidualVoxel> {
         (0..40).map(|z| voxel([(z * 7 + k) % 3, k % 2, z], 1, (z * 13 + k * 5) % 37)).collect()

@@ -1,4 +1,4 @@
-//! Voxels of drawn things in; which of them moved, went and came, out.
+//! Finds synthetic things that moved, went or appeared.
 
 use super::*;
 use crate::occupancy::{OccupancyBuilder, SessionEvidence};
@@ -8,7 +8,7 @@ fn found(then: OccupancyBuilder, now: OccupancyBuilder) -> Vec<Thing> {
     things(&then.finish(), &now.finish(), &ThingSettings::default(), &OneByOne)
 }
 
-/// A box's surface, five points a voxel.
+/// The surface of a box, with five points in each voxel.
 fn solid(tally: &mut OccupancyBuilder, min: [f64; 3], size: [f64; 3], is_empty: bool) {
     let n = size.map(|s| (s / 0.02) as i32);
     for i in 0..=n[0] {
@@ -18,8 +18,8 @@ fn solid(tally: &mut OccupancyBuilder, min: [f64; 3], size: [f64; 3], is_empty: 
                 if rim {
                     let at = [i, j, k].map(|v| 0.02 * f64::from(v));
                     let p = [min[0] + at[0], min[1] + at[1], min[2] + at[2]];
-                    let nothing = SessionEvidence::Nothing { is_pierced: false };
-                    tally.add(p, 4e-4, if is_empty { nothing } else { SessionEvidence::Something });
+                    let nothing = SessionEvidence::Empty { is_pierced: false };
+                    tally.add(p, 4e-4, if is_empty { nothing } else { SessionEvidence::Occupied });
                 }
             }
         }
@@ -29,7 +29,7 @@ fn solid(tally: &mut OccupancyBuilder, min: [f64; 3], size: [f64; 3], is_empty: 
 #[test]
 fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
-    // A cabinet stays; the other session saw surfaces there.
+    // A cabinet that stays: the other session saw its surfaces.
     solid(&mut then, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
     solid(&mut now, [5.0, 5.0, 0.02], [0.8, 0.6, 1.8], false);
     solid(&mut then, [1.0, 1.0, 0.02], [1.2, 0.8, 0.6], true);
@@ -48,7 +48,7 @@ fn a_pallet_moves_a_barrel_goes_and_a_crate_comes() {
 #[test]
 fn a_thing_pushed_by_less_than_its_length_moved_as_a_whole() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
-    // Where it stands in both sessions nothing was seen empty.
+    // The places where the pallet stands in both sessions were never seen empty.
     let parts = [(&mut then, 1.0, 0.4, 1.4, 0.8), (&mut now, 2.2, 0.4, 1.4, 0.8)];
     for (tally, own, own_length, shared, shared_length) in parts {
         solid(tally, [own, 1.0, 0.02], [own_length, 0.8, 0.6], true);
@@ -62,16 +62,16 @@ fn a_thing_pushed_by_less_than_its_length_moved_as_a_whole() {
 }
 
 #[test]
-fn a_thing_of_which_beams_graze_the_top_is_one() {
+fn a_thing_with_a_grazed_top_is_not_split() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.2, 1.0, 0.7], true);
-    // Two sides are seen in part, and rows of the top, 14 cm apart.
+    // Two sides are seen in part, and the top as rows of points 14 cm apart.
     solid(&mut now, [5.0, 1.0, 0.02], [0.1, 0.4, 0.7], true);
     solid(&mut now, [5.0, 1.9, 0.02], [0.3, 0.1, 0.7], true);
     for row in 1..=8 {
         for i in 0..10 {
             let (x, y) = (5.01 + 0.14 * f64::from(row), 1.05 + 0.1 * f64::from(i));
-            now.add([x, y, 0.71], 4e-4, SessionEvidence::Nothing { is_pierced: false });
+            now.add([x, y, 0.71], 4e-4, SessionEvidence::Empty { is_pierced: false });
         }
     }
     let found = found(then, now);
@@ -80,11 +80,11 @@ fn a_thing_of_which_beams_graze_the_top_is_one() {
 }
 
 #[test]
-fn one_side_of_a_thing_is_enough_to_know_it_by_and_a_barrel_is_none() {
+fn a_pallet_is_recognised_by_one_side_and_a_barrel_is_not() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.0, 0.66], true);
     solid(&mut then, [1.0, 6.0, 0.02], [0.9, 0.9, 0.86], true);
-    // Its long side, and a strip of its top.
+    // The long side of the pallet, and a strip of its top.
     solid(&mut now, [5.0, 1.0, 0.02], [1.2, 0.36, 0.66], true);
     let found = found(then, now);
     let kinds: Vec<_> = found.iter().map(|t| t.change).collect();
@@ -98,7 +98,7 @@ fn wires_that_a_nearer_scanner_sees_are_no_change() {
     for (scan, wire) in (0..4).flat_map(|scan| (0..12).map(move |wire| (scan, wire))) {
         for i in 0..400 {
             let at = [0.0025 * f64::from(i), 1.0, 0.05 * f64::from(wire) + 0.02];
-            now.add(at, 3.7e-5, SessionEvidence::Nothing { is_pierced: scan > 0 });
+            now.add(at, 3.7e-5, SessionEvidence::Empty { is_pierced: scan > 0 });
         }
     }
     assert!(found(then, now).is_empty());
@@ -120,7 +120,7 @@ fn what_is_near_a_robot_is_the_robots() {
 }
 
 #[test]
-fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
+fn a_thing_is_recognised_by_its_top_above_a_fence() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.2, 0.8, 0.7], true);
     solid(&mut then, [1.0, 6.0, 0.02], [0.6, 0.6, 0.5], true);
@@ -134,11 +134,11 @@ fn a_thing_of_which_only_the_top_is_seen_over_a_fence_is_known_by_it() {
 }
 
 #[test]
-fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
+fn two_visible_ends_of_a_thing_are_joined() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.3, 0.9, 0.73], true);
-    // Rows of beams graze its top: one end is seen whole, of the other an edge. Something else came
-    // beside it.
+    // Rows of beams graze the top: one end is seen completely, the other end as an edge. Another
+    // object appeared beside it.
     solid(&mut now, [5.0, 1.0, 0.02], [0.7, 0.85, 0.73], true);
     solid(&mut now, [6.1, 1.1, 0.27], [0.2, 0.7, 0.48], true);
     solid(&mut now, [5.0, 2.4, 0.02], [0.3, 0.3, 0.4], true);
@@ -151,11 +151,11 @@ fn a_thing_of_which_two_ends_are_seen_apart_is_one() {
 }
 
 #[test]
-fn an_end_beside_a_thing_that_was_turned_is_its_own() {
+fn a_low_thing_beside_a_turned_one_is_separate() {
     let (mut then, mut now) = (OccupancyBuilder::default(), OccupancyBuilder::default());
     solid(&mut then, [1.0, 1.0, 0.02], [1.4, 1.4, 0.73], true);
-    // Turned, it has narrower bounds; a post hides a strip of it. A lower thing beside it is
-    // another one.
+    // The turned thing has narrower bounds, and a post hides a strip of it. The lower thing beside
+    // it is another one.
     solid(&mut now, [5.0, 1.0, 0.02], [1.1, 1.0, 0.73], true);
     solid(&mut now, [6.2, 1.2, 0.02], [0.25, 0.4, 0.73], true);
     solid(&mut now, [4.5, 1.2, 0.02], [0.25, 0.3, 0.4], true);
@@ -166,12 +166,12 @@ fn an_end_beside_a_thing_that_was_turned_is_its_own() {
     assert!(found[1].now.expect("bounds").contains([4.6, 1.3, 0.2]));
 }
 
-/// A sheet that stands upright, of which so many of ten points are pierced.
+/// An upright sheet of which this number of points in ten are pierced.
 fn sheet(tally: &mut OccupancyBuilder, n_pierced: i32) {
     for (i, j) in (0..40).flat_map(|i| (0..20).map(move |j| (i, j))) {
         let is_pierced = (i + j) % 10 < n_pierced;
         let at = [1.01, 1.0 + 0.02 * f64::from(i), 1.0 + 0.02 * f64::from(j)];
-        tally.add(at, 4e-4, SessionEvidence::Nothing { is_pierced });
+        tally.add(at, 4e-4, SessionEvidence::Empty { is_pierced });
     }
 }
 

@@ -1,4 +1,4 @@
-//! Paths of an arm past drawn points; what is near on the way.
+//! Contacts of an arm on paths past synthetic points.
 
 use super::*;
 use crate::{Cells, KnownBounds};
@@ -23,17 +23,22 @@ fn legs(body: &RobotBody<'_>, path: &[Vec<f64>]) -> Vec<Leg> {
 
 fn contacts(walk: &PathWalk<'_>) -> Vec<Contact> {
     let mut all = Contacts::default();
-    (0..walk.n_pieces()).for_each(|piece| walk.add(walk.look(piece), &mut all));
+    (0..walk.n_pieces()).for_each(|piece| walk.add(walk.examine(piece), &mut all));
     all.all()
 }
 
-fn walk(points: &[([f64; 3], What)], path: &[f64], found: f64, margin: f64) -> Vec<Contact> {
+fn walk(
+    points: &[([f64; 3], ObstacleKind)],
+    path: &[f64],
+    found: f64,
+    margin: f64,
+) -> Vec<Contact> {
     walk_in(None, points, path, found, margin)
 }
 
 fn walk_in(
     space: Option<&Space>,
-    points: &[([f64; 3], What)],
+    points: &[([f64; 3], ObstacleKind)],
     path: &[f64],
     found: f64,
     margin: f64,
@@ -43,11 +48,11 @@ fn walk_in(
     let mut body = RobotBody::new(&model, BTreeMap::new(), margin, 0.0, &OneByOne);
     let mut cells = Cells::within(crate::reach(&model) + margin + 0.1, &BTreeMap::new());
     points.iter().for_each(|(p, what)| cells.add(*p, *what, false, 0));
-    cells.settle();
+    cells.remove_duplicates();
     let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
     let known = KnownBounds { world_from_base: Pose::identity(), bounds };
     let mut around = Obstacles::new(&cells, &[], space, known);
-    body.stand(&[found], &mut around);
+    body.remove_robot(&[found], &mut around);
     let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
     let legs = legs(&body, &path);
     let walk = PathWalk::new(&body, &around, &path, &legs, &[found]);
@@ -56,20 +61,20 @@ fn walk_in(
 
 #[test]
 fn a_post_in_the_way_is_hit_where_it_stands() {
-    // Half a turn; the post stands 90° on, 0.9 m away.
+    // The arm turns by half a turn. The post stands at 90°, 0.9 m away.
     let post: Vec<_> =
-        (0..100).map(|k| ([0.0, 0.9, 0.002 * f64::from(k) - 0.1], What::Fixed)).collect();
+        (0..100).map(|k| ([0.0, 0.9, 0.002 * f64::from(k) - 0.1], ObstacleKind::Fixed)).collect();
     let found = walk(&post, &[0.0, std::f64::consts::PI], 0.0, 0.02);
     let [hit] = &found[..] else { panic!("one contact: {found:?}") };
     assert!(!hit.as_found && hit.level >= ContactLevel::Hit && hit.gap == 0.0, "{hit:?}");
-    // The beam's side is 5 cm off its middle: 3.2° before, and as much behind; the margin and
-    // half a step more.
+    // The side of the beam is 5 cm off its axis, which it reaches 3.2° earlier and leaves 3.2°
+    // later, plus the margin and half a step.
     let share = (0.05_f64 / 0.9).asin() / std::f64::consts::PI;
     assert!(hit.from < 0.5 - share && hit.from > 0.5 - 1.8 * share, "{hit:?}");
     assert!(hit.to > 0.5 + share && hit.to < 0.5 + 1.8 * share, "{hit:?}");
     assert!((hit.at.expect("a point") - Point::new(0.0, 0.9, 0.0)).norm() < 0.12);
-    // Beyond its end nothing is hit; within the margin it is near.
-    let beyond = |off: f64| vec![([0.0, 1.0 + off, 0.0], What::Fixed)];
+    // A post beyond the end of the beam is not hit; within the margin it is near.
+    let beyond = |off: f64| vec![([0.0, 1.0 + off, 0.0], ObstacleKind::Fixed)];
     assert!(walk(&beyond(0.04), &[0.0, 3.0], 0.0, 0.02).is_empty());
     let near = walk(&beyond(0.015), &[0.0, 3.0], 0.0, 0.02);
     assert!(near.len() == 1 && near[0].level == ContactLevel::Near, "{near:?}");
@@ -77,17 +82,19 @@ fn a_post_in_the_way_is_hit_where_it_stands() {
 }
 
 #[test]
-fn what_it_touched_where_it_was_found_is_told_apart_until_it_comes_nearer() {
-    // At its end, 1 cm away, as found; and a post that it turns into.
-    let points = [([1.01, 0.0, 0.0], What::Uncertain), ([0.0, 0.8, 0.0], What::Fixed)];
+fn contacts_as_found_are_listed_separately_until_they_come_nearer() {
+    // One post is at the end of the beam, 1 cm away as it was scanned; the beam turns into the
+    // other.
+    let points =
+        [([1.01, 0.0, 0.0], ObstacleKind::Uncertain), ([0.0, 0.8, 0.0], ObstacleKind::Fixed)];
     let found = walk(&points, &[0.0, 1.6], 0.0, 0.02);
     let levels: Vec<_> =
         found.iter().map(|c| (c.what, c.level >= ContactLevel::Hit, c.as_found)).collect();
-    assert_eq!(levels, [(What::Fixed, true, false), (What::Beside, false, true)]);
-    // The same point is none of its own where it was found elsewhere.
+    assert_eq!(levels, [(ObstacleKind::Fixed, true, false), (ObstacleKind::Beside, false, true)]);
+    // The same point does not belong to the arm if the arm was scanned in another posture.
     assert!(walk(&points[..1], &[0.0, 1.6], 1.6, 0.02).iter().all(|c| !c.as_found));
-    // It was near where it was found, and is inside on the way.
-    let points = [([0.9, 0.06, 0.0], What::Fixed)];
+    // The point was near the arm as scanned, and is inside the arm on the path.
+    let points = [([0.9, 0.06, 0.0], ObstacleKind::Fixed)];
     let found = walk(&points, &[0.0, 0.1], 0.0, 0.02);
     assert!(found.iter().any(|c| c.level >= ContactLevel::Hit && !c.as_found), "{found:?}");
 }
@@ -103,18 +110,19 @@ fn what_was_hardly_beyond_the_margin_is_as_found_a_little_beside_the_posture_tha
 
 #[test]
 fn what_was_near_outside_is_not_as_found_inside() {
-    // Beside the beam, 15 mm off its side; it is pushed into by 10 mm and no more.
-    let points = [([0.5, 0.065, 0.0], What::Fixed)];
+    // The point is beside the beam, 15 mm off its side, and the beam moves 10 mm into it.
+    let points = [([0.5, 0.065, 0.0], ObstacleKind::Fixed)];
     let found = walk(&points, &[0.0, 0.05], 0.0, 0.02);
     assert!(found.iter().any(|c| c.level == ContactLevel::Inside && !c.as_found), "{found:?}");
 }
 
 #[test]
 fn points_on_its_own_surface_are_no_obstacle() {
-    // A patch that a mask left to the fixed world, so far off the beam's side.
+    // A patch of points of the robot that a mask labelled as fixed, at this distance from the
+    // beam's side.
     let patch = |off: f64| -> Vec<_> {
         let at = |k: u32| [0.4 + 0.01 * f64::from(k % 10), 0.05 + off, 0.01 * f64::from(k / 10)];
-        (0..40).map(|k| (at(k), What::Fixed)).collect()
+        (0..40).map(|k| (at(k), ObstacleKind::Fixed)).collect()
     };
     assert_eq!(walk(&patch(0.003), &[0.0, 0.3], 0.0, 0.02), []);
     let hit = |c: &Contact| c.level >= ContactLevel::Hit && !c.as_found;
@@ -138,37 +146,37 @@ fn a_few_points_beside_its_own_surface_are_strays_where_space_is_known() {
     let bounds = Aabb { min: [-2.0; 3], max: [2.0; 3] };
     let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
     space.voxels_mut().fill(SpaceKind::Free);
-    // The beam's side as a mask left it, and so many points that stand off it by 12 to 15 mm.
+    // The beam's side as a mask labelled it, and this number of points 12 to 15 mm off the side.
     let side = (0..40_u32).map(|k| {
-        ([0.4 + 0.01 * f64::from(k % 10), 0.053, 0.01 * f64::from(k / 10)], What::Uncertain)
+        ([0.4 + 0.01 * f64::from(k % 10), 0.053, 0.01 * f64::from(k / 10)], ObstacleKind::Uncertain)
     });
     let beside = |n: u32, apart: f64| -> Vec<_> {
         let at = |k: u32| [0.42 + apart * f64::from(k), 0.062 + 0.003 * f64::from(k % 2), 0.02];
-        let off = (0..n).map(|k| (at(k), What::Uncertain));
+        let off = (0..n).map(|k| (at(k), ObstacleKind::Uncertain));
         side.clone().chain(off).collect()
     };
     let contacts = |points: &[_], space| walk_in(space, points, &[0.0, 0.1], 0.0, 0.02);
     assert_eq!(contacts(&beside(3, 0.01), Some(&space)), []);
-    // Nothing is known of space: each may be of an object.
+    // Without known space each point may belong to an object.
     assert_ne!(contacts(&beside(3, 0.01), None), []);
-    // A small object, and a wire along the beam that few beams met.
+    // A small object, and a wire along the beam with few points.
     assert_ne!(contacts(&beside(6, 0.01), Some(&space)), []);
     assert_ne!(contacts(&beside(6, 0.04), Some(&space)), []);
 }
 
 #[test]
 fn uncertain_points_beside_it_may_move_with_it() {
-    // Above the beam's end; and a post that the beam passes below, but not they.
-    let beside = (0..8).map(|k| ([0.9, 0.0, 0.07 + 0.01 * f64::from(k)], What::Uncertain));
-    let post = std::iter::once(([0.0, 0.9, 0.12], What::Fixed));
+    // A point above the beam's end, and a post of which the beam passes below the lowest point.
+    let beside = (0..8).map(|k| ([0.9, 0.0, 0.07 + 0.01 * f64::from(k)], ObstacleKind::Uncertain));
+    let post = std::iter::once(([0.0, 0.9, 0.12], ObstacleKind::Fixed));
     let points: Vec<_> = beside.chain(post).collect();
     let found = walk(&points, &[0.0, 3.0], 0.0, 0.02);
-    let fixed: Vec<_> = found.iter().filter(|c| c.what == What::Fixed).collect();
+    let fixed: Vec<_> = found.iter().filter(|c| c.what == ObstacleKind::Fixed).collect();
     assert!(
         fixed.len() == 1 && fixed[0].is_doubtful && fixed[0].level == ContactLevel::Hit,
         "{found:?}"
     );
-    let away = found.iter().filter(|c| c.what == What::Beside && !c.as_found);
+    let away = found.iter().filter(|c| c.what == ObstacleKind::Beside && !c.as_found);
     assert!(away.count() == 0, "it does not come nearer to them: {found:?}");
 }
 
@@ -183,7 +191,7 @@ fn whole_turns_are_no_rest() {
 
 #[test]
 fn what_lies_inside_of_a_link_from_the_beginning_is_hit() {
-    let found = walk(&[([0.5, 0.0, 0.0], What::Uncertain)], &[0.0], 1.0, 0.005);
+    let found = walk(&[([0.5, 0.0, 0.0], ObstacleKind::Uncertain)], &[0.0], 1.0, 0.005);
     assert!(found.len() == 1 && found[0].level == ContactLevel::Inside, "{found:?}");
 }
 
@@ -204,6 +212,6 @@ fn space_of_which_nothing_is_known_is_not_free() {
     let legs = legs(&body, &path);
     let walk = PathWalk::new(&body, &around, &path, &legs, &[0.0]);
     let found = contacts(&walk);
-    assert!(found.len() == 1 && found[0].what == What::Unseen && found[0].at.is_none());
+    assert!(found.len() == 1 && found[0].what == ObstacleKind::Unseen && found[0].at.is_none());
     assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");
 }

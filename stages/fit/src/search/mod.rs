@@ -168,7 +168,8 @@ impl BeamSearch<'_> {
         let probe = |(at, (link, pose)): (usize, &(usize, Pose))| {
             let (points, normals) = self.prepared().samples(*link, which.end);
             let first = which.start.min(points.len());
-            let samples = (&points[first..], &normals[first..]);
+            let (points, normals) = (&points[first..], &normals[first..]);
+            let samples = geometry::SurfaceSamples { points, normals };
             let before = before.get(at).copied().unwrap_or_default();
             self.problem.scene.scouts.probe_more(before, samples, pose, tolerance)
         };

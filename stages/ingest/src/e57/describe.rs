@@ -1,5 +1,5 @@
-//! The description of one scan in an E57 file and its first records in; the scan, and its seed with
-//! all that is odd about it, out.
+//! Makes the scan and its seed from its description in an E57 file and from its first records. The
+//! seed lists all that is odd about them.
 
 use super::look::E57Look;
 use super::scan::{Coordinates, E57Scan};
@@ -13,10 +13,10 @@ use geometry::{Aabb, Point, Pose};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
-/// Share of the points looked at that lie at the origin of a file whose scanner is not known, from
-/// which on they are beams without return: a single one may have been measured.
+/// If the scanner's position is not known: share of sampled points at the origin of the file from
+/// which on these are beams without return. A single one may have been measured.
 const NO_RETURNS: f64 = 0.005;
-/// Scans of fewer points are a writer's examples, and the origin may be one of their points.
+/// Scans with fewer points are examples, and the origin may be one of their points.
 const FEW: usize = 64;
 
 impl E57Scan {
@@ -72,7 +72,7 @@ impl E57Scan {
         Ok((scan, seed))
     }
 
-    /// Takes the span that the intensities have where most of them do not keep to their limits.
+    /// Uses the span of the intensities if most of them lie outside their stated limits.
     fn suit_intensity(&mut self, look: &E57Look, is_stated: bool, notes: &mut Vec<String>) {
         let Some(channel) = &mut self.intensity else { return };
         let (span, note) = channel.span.suited(&look.intensities, is_stated);

@@ -9,7 +9,7 @@ use crate::frame::NO_RETURN;
 use contract::Result;
 use std::path::Path;
 
-/// Number of records that are looked at, which takes a hundredth of a second.
+/// Number of records that are sampled, which takes a hundredth of a second.
 const N_RECORDS: usize = 65_536;
 /// Number of records that are decoded at once.
 const BLOCK: usize = 4096;

@@ -63,7 +63,7 @@ impl Packets {
         };
         if header[0] != 1 {
             return Err(Error::bad_input(format!(
-                "no points where the scan says they are: section of kind \"{}\"",
+                "the offset of the points leads to a section of another kind, \"{}\"",
                 header[0]
             ))
             .at(format!("page {}", Pages::page(start))));

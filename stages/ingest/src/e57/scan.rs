@@ -1,4 +1,5 @@
-//! The description of one scan in an E57 file in; which fields hold what, out.
+//! Reads from the description of one scan in an E57 file which of its fields hold coordinates,
+//! intensity, rows and columns.
 
 use crate::frame::FileFrame;
 use crate::levels::Span;

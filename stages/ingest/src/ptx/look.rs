@@ -7,13 +7,13 @@ use crate::text::numbers;
 
 /// Number of first points by which it is judged whether the origin can be the scanner.
 const N_JUDGED: usize = 64;
-/// Approximate number of further lines that are looked at, evenly spread.
+/// Approximate number of further lines that are sampled, evenly spread.
 const N_LOOKED: u64 = 4096;
 
 /// What the sampled lines of a block show.
 #[derive(Debug)]
 pub(super) struct PtxLook {
-    /// Distance between the lines with a point that are looked at.
+    /// Distance between the sampled lines with a point.
     every: u64,
     /// Metres per unit of the file.
     metres: f64,

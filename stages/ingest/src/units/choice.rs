@@ -16,7 +16,7 @@ pub(crate) type UnitPair = [LengthUnit; 2];
 /// The units that a user gave.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Choice {
-    /// Units of all files that have none of their own.
+    /// Units of all files without units of their own.
     all: Option<UnitPair>,
     /// File names with their own units.
     own: Vec<(String, UnitPair)>,

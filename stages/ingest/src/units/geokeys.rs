@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn degrees_are_told_and_broken_keys_say_nothing() {
+    fn degrees_are_recognised_and_broken_keys_are_ignored() {
         let system = |keys: &[[u16; 4]]| read_keys(keys, &[]).map(|found| found.system);
         assert_eq!(system(&[[1024, 0, 1, 2], [2048, 0, 1, 4326]]), Some(System::Degrees));
         assert_eq!(system(&[[2048, 0, 1, 4326]]), Some(System::Degrees));

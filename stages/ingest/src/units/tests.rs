@@ -69,7 +69,7 @@ fn what_is_no_length_is_refused_with_a_way_out() {
 }
 
 #[test]
-fn what_counts_goes_first_and_another_mind_is_told() {
+fn units_are_taken_in_order_and_contradictions_are_noted() {
     let (feet, metres) = (r#"PROJCS["a",UNIT["foot",0.3048]]"#, r#"PROJCS["a",UNIT["metre",1]]"#);
     let units = of(&[feet, metres]).unwrap();
     assert_eq!(units.factors(), [0.3048; 3]);

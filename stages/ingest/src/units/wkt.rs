@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn degrees_and_the_earths_middle_are_told() {
+    fn degrees_and_geocentric_coordinates_are_recognised() {
         for (text, system) in [
             (r#"GEOGCS["WGS 84",UNIT["degree",0.01745]]"#, System::Degrees),
             (r#"GEOGCRS["WGS 84",CS[ellipsoidal,2],ANGLEUNIT["degree",0.01745]]"#, System::Degrees),

@@ -1,7 +1,7 @@
 //! Finds which side of a link's surface faces the outside, if any. Vendors' meshes contain motors
 //! and bolts that no scanner sees, and triangles with reversed orientation.
 
-use super::SurfaceSample;
+use super::place::{SurfaceSample, corners as triangle_corners};
 use crate::model::Mesh;
 use nalgebra::Vector3;
 use parry3d::bounding_volume::Aabb;
@@ -35,7 +35,7 @@ pub(super) struct Shell {
 
 impl Shell {
     pub(super) fn new(mesh: &Mesh) -> Self {
-        let corners = |t: &[u32; 3]| super::corners(mesh, t);
+        let corners = |t: &[u32; 3]| triangle_corners(mesh, t);
         let boxes: Vec<Aabb> = (mesh.triangles.iter().map(corners))
             .map(|[a, b, c]| {
                 let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));

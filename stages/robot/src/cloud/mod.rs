@@ -2,12 +2,13 @@
 //! prefix is spread evenly.
 
 mod exterior;
+mod place;
 mod spread;
 
 use crate::model::{CadCloud, Mesh};
 use exterior::{Blockers, Shell, Side};
-use nalgebra::Vector3;
-use rand::{Rng as _, RngExt as _, SeedableRng as _};
+use place::{SurfaceSample, corners};
+use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::SplitMix64;
 
 /// Number of candidates for each sample that is kept: with fewer the samples leave holes, with more
@@ -19,18 +20,6 @@ const JUDGED_CELL: f32 = 0.015;
 /// Depth of such a cell along the normal, metres, so that the two sides of sheet metal are judged
 /// separately.
 const JUDGED_DEPTH: f32 = 0.004;
-
-/// A place on the surface, with its normal.
-#[derive(Debug, Clone, Copy)]
-struct SurfaceSample {
-    at: Vector3<f32>,
-    normal: Vector3<f32>,
-}
-
-/// An integer in [0, n).
-fn below(random: &mut SplitMix64, n: usize) -> usize {
-    ((u128::from(random.next_u64()) * n as u128) >> 64) as usize
-}
 
 /// Smallest number of samples of a link, as far as [`MIN_SPACING`] allows. The pose of a small
 /// wrist is determined by its bolts and edges, and a sample beside an edge has the wrong normal.
@@ -64,10 +53,6 @@ pub(crate) fn sample(mesh: &Mesh, spacing: f64, max_samples: usize) -> CadCloud 
         normals: samples.iter().map(|s| s.normal.into()).collect(),
         area: area as f32,
     }
-}
-
-fn corners(mesh: &Mesh, triangle: &[u32; 3]) -> [Vector3<f32>; 3] {
-    triangle.map(|i| mesh.vertices[i as usize].into())
 }
 
 fn area(mesh: &Mesh, triangle: &[u32; 3]) -> f64 {

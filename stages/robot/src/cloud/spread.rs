@@ -1,7 +1,7 @@
 //! Selects samples from candidates so that every prefix of the result keeps its distances, too
 //! (Poisson-disk sampling by dart throwing with a shrinking radius).
 
-use super::{SurfaceSample, below};
+use super::place::{SurfaceSample, below};
 use rand_xoshiro::SplitMix64;
 
 /// Radius of a dart relative to the spacing; with this value there are as many samples as squares

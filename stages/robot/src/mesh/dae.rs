@@ -2,7 +2,7 @@
 //! `<unit>` are applied; `<up_axis>` is ignored, as by the viewers for which robot vendors draw
 //! their meshes.
 
-use super::Soup;
+use super::soup::Soup;
 use crate::settings::Settings;
 use contract::check_xml;
 use nalgebra::{Matrix4, Rotation3, Unit, Vector3};
@@ -123,8 +123,7 @@ impl<'a, 'i> DaeScene<'a, 'i> {
     /// Counts bytes that are read again or kept, and refuses the file when the allowance is spent.
     fn spend(&mut self, n: usize) -> Result<(), String> {
         self.left = self.left.checked_sub(n as u64).ok_or(
-            "it comes to far more than its size by what is named again and again; if it is right, raise --set \
-             robot.max_mesh_growth",
+            "it instantiates the same geometry so often that it exceeds its size by far; if the file is right, raise --set robot.max_mesh_growth",
         )?;
         Ok(())
     }
@@ -162,7 +161,7 @@ impl<'a, 'i> DaeScene<'a, 'i> {
     ) -> Result<(), String> {
         self.n_visits += 1;
         if depth > MAX_DEPTH || self.n_visits > MAX_VISITS {
-            return Err("nodes lie in one another too deeply, or in a circle".to_owned());
+            return Err("nodes are nested too deeply, or in a circle".to_owned());
         }
         let mut scene_from_node = scene_from_parent;
         for part in node.children().filter(Node::is_element) {
@@ -237,7 +236,7 @@ impl<'a, 'i> DaeScene<'a, 'i> {
         Ok(())
     }
 
-    /// Where the index of a corner's position stands among the indices of one corner.
+    /// Position of the index of a corner's vertex among the indices of one corner.
     fn layout(
         &self,
         mesh: Node<'a, 'i>,
@@ -251,7 +250,7 @@ impl<'a, 'i> DaeScene<'a, 'i> {
                 .map_or(Ok(0), str::parse)
                 .map_err(|_| "an input's offset is no number".to_owned())?;
             if offset > 255 {
-                return Err("an input's offset is out of reach".to_owned());
+                return Err("an input's offset is too large".to_owned());
             }
             stride = stride.max(offset + 1);
             let id = local(input, "source");

@@ -4,50 +4,19 @@
 mod dae;
 mod obj;
 pub(crate) mod primitive;
+mod soup;
 mod stl;
+
+pub(crate) use soup::Soup;
 
 use crate::encoding;
 use crate::model::Mesh;
 use crate::settings::Settings;
 use geometry::{Pose, Vector, narrow::local_f32};
+use soup::text;
 use std::collections::HashMap;
 
-/// Largest number of triangles of one file; the largest known robots have 480,000 in all.
-pub(crate) const MAX_TRIANGLES: usize = 4_000_000;
-
-/// The triangles of a file, in metres by the file's own unit.
-#[derive(Debug, Default, Clone, PartialEq)]
-pub(crate) struct Soup {
-    pub(crate) vertices: Vec<[f64; 3]>,
-    pub(crate) triangles: Vec<[u32; 3]>,
-    /// Remarks about the file for the user.
-    pub(crate) notes: Vec<String>,
-}
-
-impl Soup {
-    /// Adds a vertex and returns its index, or why it cannot be added.
-    fn add_vertex(&mut self, p: [f64; 3]) -> Result<u32, String> {
-        let at = u32::try_from(self.vertices.len()).map_err(|_| "too many vertices".to_owned())?;
-        self.vertices.push(p);
-        Ok(at)
-    }
-
-    fn add_triangle(&mut self, corners: [u32; 3]) -> Result<(), String> {
-        if self.triangles.len() >= MAX_TRIANGLES {
-            return Err(format!("more triangles than a link can have \"{MAX_TRIANGLES}\""));
-        }
-        self.triangles.push(corners);
-        Ok(())
-    }
-
-    fn note(&mut self, note: &str) {
-        if !self.notes.iter().any(|known| known == note) {
-            self.notes.push(note.to_owned());
-        }
-    }
-}
-
-/// Reads a mesh file in the format that its file name extension tells.
+/// Reads a mesh file in the format of its file name extension.
 pub(crate) fn read(bytes: &[u8], extension: &str, settings: &Settings) -> Result<Soup, String> {
     let soup = match extension.to_lowercase().as_str() {
         "stl" => stl::read(bytes),
@@ -58,10 +27,6 @@ pub(crate) fn read(bytes: &[u8], extension: &str, settings: &Settings) -> Result
         )),
     }?;
     if soup.triangles.is_empty() { Err("the file has no triangles".to_owned()) } else { Ok(soup) }
-}
-
-fn text(bytes: &[u8]) -> Result<&str, String> {
-    std::str::from_utf8(bytes).map_err(|e| format!("not UTF-8 from byte {}", e.valid_up_to()))
 }
 
 /// Adds the triangles of a file to a link's mesh: scaled and placed, with equal vertices joined and

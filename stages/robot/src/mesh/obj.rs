@@ -1,6 +1,6 @@
 //! Reads triangles from an OBJ file. Materials, groups, normals, lines and curves are ignored.
 
-use super::Soup;
+use super::soup::Soup;
 
 pub(super) fn read(text: &str) -> Result<Soup, String> {
     let mut soup = Soup::default();

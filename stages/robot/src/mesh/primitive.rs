@@ -1,6 +1,6 @@
 //! Triangulates boxes, cylinders, capsules and spheres, oriented outward, and splits polygons.
 
-use super::Soup;
+use super::soup::Soup;
 use std::f64::consts::{PI, TAU};
 
 /// Sides of a round body: 13 would deviate by 3 % from the true radius, 48 deviate by 0.2 %.

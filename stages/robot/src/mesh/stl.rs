@@ -1,6 +1,6 @@
 //! Reads triangles from an STL file: ASCII, binary, or binary with a header that begins "solid".
 
-use super::Soup;
+use super::soup::Soup;
 
 const HEADER_BYTES: usize = 84;
 const RECORD_BYTES: usize = 50;
@@ -16,7 +16,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, String> {
     let is_text =
         bytes.trim_ascii_start().starts_with(b"solid") && head.is_ascii() && !head.contains(&0);
     if is_text {
-        return ascii(super::text(bytes)?);
+        return ascii(super::soup::text(bytes)?);
     }
     match (claimed, expected) {
         (Some(n), Some(expected)) if expected < bytes.len() => {

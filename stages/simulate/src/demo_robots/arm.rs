@@ -1,8 +1,9 @@
 //! The small six-axis demo robot: a bench-top arm of 1.1 m reach with its upper arm on one side.
 
+use super::axes::{FULL_TURN, X, Y, Z};
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
 use super::design::{Design, DesignPart, Hinge};
-use super::{ARM, FULL_TURN, X, Y, Z};
+use super::names::ARM;
 use crate::solid::{Solid, bolts, cuboid, disc};
 
 /// Height of joint 1 above the foot, metres.

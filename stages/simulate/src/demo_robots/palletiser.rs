@@ -1,9 +1,10 @@
 //! The palletiser: four axes, bars (RR) that keep elbow plate and wrist level, and a rod that
 //! drives the forearm from the carousel.
 
+use super::axes::{FULL_TURN, Y, Z};
 use super::castings::{bar, boom, cheek, foot, hub, motor, pipe, rib, trunk};
 use super::design::{Design, DesignPart, DesignSubChain, Hinge};
-use super::{FULL_TURN, PALLETISER, Y, Z};
+use super::names::PALLETISER;
 use crate::solid::{Solid, bolts, cuboid, disc, lathe};
 
 /// Height of joint 1 above the foot, metres.

@@ -1,12 +1,13 @@
 //! The large spot welder: six revolute axes, a gas-spring balancer (RPR), a parallelogram that
 //! drives the forearm (RRR), and a gun whose sliding electrode is the seventh joint.
 
+use super::axes::{FULL_TURN, X, Y, Z};
 use super::castings::{boom, cheek, foot, hub, motor, pipe, rib, tool_plate, trunk};
 use super::design::{Design, DesignPart, Hinge};
 use super::gun::{electrode, gun};
+use super::names::WELDER;
 use super::welder_dimensions::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
 use super::welder_loops::{balancer, parallelogram};
-use super::{FULL_TURN, WELDER, X, Y, Z};
 use crate::solid::{Solid, bolts, cuboid, disc};
 
 /// Height of joint 1 above the foot, metres.

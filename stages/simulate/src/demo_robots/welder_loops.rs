@@ -1,9 +1,9 @@
 //! The sub chains of the spot welder: balancer (RPR) and parallelogram (RRR).
 
+use super::axes::{X, Y};
 use super::castings::{bar, cheek, hub};
 use super::design::{DesignPart, DesignSubChain, Hinge};
 use super::welder_dimensions::{CYLINDER_PIN, LEVER, ROD_PIN, SHOULDER, UPPER};
-use super::{X, Y};
 use crate::solid::{Solid, cuboid, disc, lathe};
 
 /// Plane of the lever, and of the rod beside it, metres.

@@ -1,6 +1,7 @@
 //! Simple closed bodies from outlines: prism, lathe, loft, tube, and bodies made of them.
 
-use super::{Solid, cap};
+use super::body::Solid;
+use super::cap;
 use geometry::{Point, Vector};
 use std::f64::consts::TAU;
 
