@@ -1,12 +1,12 @@
-//! Third phase: a refined posture becomes [`Adjusted`]. Base, joints and the scans' own errors in
-//! one robust least-squares adjustment, with a covariance that holds although errors of points are
-//! correlated (METHOD.md §11, §14).
+//! Third phase: adjusts base, joints and the scans' own errors of a refined posture together
+//! ([`Adjusted`]). One robust least-squares adjustment gives a covariance that holds although the
+//! errors of points are correlated (METHOD.md §11, §14).
 //!
-//! Beside base and joints each scan has a shift, a turn about its scanner and a range bias with
-//! priors: scans are registered to millimetres only, and a fit that does not know that bends the
-//! robot. And each patch of the model's surface has an offset along its normals, `u ~ N(0, σ_u²)`,
-//! taken out in closed form, σ_u estimated from the patches themselves: a model is drawn to
-//! millimetres only. Both or neither: without the patches scans would be bent to fit a wrong shape.
+//! Each scan has a shift, a turn about its scanner and a range bias, all with priors: scans are
+//! registered to millimetres, and a fit that ignores that bends the robot. Each patch of the
+//! model's surface has an offset along its normals, `u ~ N(0, σ_u²)`, which is taken out in closed
+//! form; σ_u is estimated from the patches. Models are drawn to millimetres, and without the
+//! patches the scans would be bent to fit a wrong shape.
 
 mod footprint;
 mod normal;
@@ -42,7 +42,7 @@ pub(crate) struct Adjusted {
     pub(crate) shared: Option<[DMatrix<f64>; 2]>,
     /// How far the model's surface is off, standard deviation over its patches, metres.
     pub(crate) patch_sigma: f64,
-    /// How smoothly it is.
+    /// How smoothly the offset varies over a link.
     pub(crate) smoothness: Smoothness,
     /// Points within the gate, for each link.
     pub(crate) n_points: Vec<usize>,
@@ -88,7 +88,7 @@ const SMALL_STEP: f64 = 0.3;
 const TUKEY: f64 = 4.685;
 
 impl<'a> Adjust<'a> {
-    /// Of base and joints.
+    /// An adjustment of base and joints.
     pub(crate) fn new(problem: &Problem<'a>) -> Self {
         Self { problem: *problem, places: &[], loose: &[] }
     }
@@ -98,7 +98,7 @@ impl<'a> Adjust<'a> {
         self.run_from(AdjustState::at(start, self.problem.scene), points)
     }
 
-    /// The same from any state.
+    /// Adjusts from any state.
     pub(crate) fn run_from(&self, start: AdjustState, points: &mut AdjustPoints) -> Adjusted {
         let mut state = start;
         let (mut round, mut before) = (0, 0.0);

@@ -41,9 +41,9 @@ pub(crate) use wrist::{OtherEnd, WristModes, gain};
 
 use crate::adjust::Adjusted;
 use crate::correspond::AdjustPoints;
-use crate::judge::Judgement;
+use crate::problem::Judgement;
 use crate::refine::Refined;
-use crate::turns;
+use geometry::angle;
 
 /// Values of one joint.
 #[derive(Debug, Clone)]
@@ -68,7 +68,7 @@ impl JointModes {
 pub(crate) fn better_leaves(posture: &[f64], leaves: &[JointModes]) -> Option<Vec<f64>> {
     let mut out = posture.to_vec();
     leaves.iter().for_each(|s| out[s.joint] = s.values[0]);
-    let is_other = |s: &JointModes| turns::apart(posture[s.joint], out[s.joint]) > MODES.same_turn;
+    let is_other = |s: &JointModes| angle::apart(posture[s.joint], out[s.joint]) > MODES.same_turn;
     leaves.iter().any(is_other).then_some(out)
 }
 
@@ -94,7 +94,7 @@ impl Settled {
 }
 
 /// The answer and all that explains the points about as well: what a report is made of.
-pub(crate) struct Answer {
+pub(crate) struct PostureModes {
     pub(crate) best: Settled,
     /// The points of its adjustment, with what their beams met.
     pub(crate) points: AdjustPoints,

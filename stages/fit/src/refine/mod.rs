@@ -1,8 +1,8 @@
-//! Second phase: hypotheses of a search become [`Refined`] postures. Base and all joints move to
-//! the least robust point-to-plane error on thinned points, and beams judge where they end
-//! (METHOD.md §11.1).
+//! Second phase: refines hypotheses of a search ([`Refined`]). Base and all joints move to the
+//! least robust point-to-plane error on thinned points, and beams judge where they end (METHOD.md
+//! §11.1).
 //!
-//! In the rounds with wide gates surface that beams went through gives way along them, too
+//! In the rounds with wide gates, surface that beams went through is moved along these beams, too
 //! (`correspond/pierced.rs`).
 
 mod gauss_newton;
@@ -10,8 +10,7 @@ mod gauss_newton;
 pub(crate) use gauss_newton::add_scaled;
 
 use crate::correspond::{PerLink, some, stratified};
-use crate::judge::{Judgement, judge, judged};
-use crate::problem::{Problem, SweepSteps};
+use crate::problem::{Judgement, Problem, SweepSteps, judge, judged};
 
 use crate::state::Hypothesis;
 use gauss_newton::{noise, run};
