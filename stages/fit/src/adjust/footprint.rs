@@ -8,7 +8,7 @@
 use geometry::Vector;
 use std::f64::consts::TAU;
 
-use super::Adjust;
+use super::adjustment::Adjust;
 use crate::correspond::{AdjustPoints, MetTriangle, Pairing, SurfacePair};
 use crate::model::BeamPlace;
 use crate::problem::{AdjustState, Problem};

@@ -7,8 +7,8 @@ use nalgebra::DMatrix;
 use robot::{Model, Motion};
 use std::f64::consts::TAU;
 
-use super::Rival;
 use super::covariance::sigma_of;
+use super::rival::Rival;
 use crate::modes::{JointModes, MODES, closes_tool};
 use crate::problem::Problem;
 use crate::state::Hypothesis;

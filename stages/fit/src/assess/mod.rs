@@ -5,6 +5,7 @@
 mod covariance;
 mod estimate;
 mod joints;
+mod rival;
 
 use contract::{Certainty, Fit, JointFit, RunnerUp};
 use robot::Model;
@@ -17,18 +18,12 @@ use crate::modes::{
     JointModes, MODES, PostureModes, camera_spread, lead, reach_of_others, with_foot,
 };
 use crate::problem::{Judgement, Problem, link_evidence};
-use crate::refine::Refined;
 use crate::verdict::{self, JudgedFit, RIVAL, VerdictEvent};
 use covariance::{in_world_axes, scans, share, sigma_of, widen};
 use joints::{OpenJoints, differs, equals, joints};
+use rival::Rival;
 
-/// Another posture, and how clearly the best is better.
-struct Rival<'a> {
-    margin: f64,
-    other: &'a Refined,
-}
-
-/// What is reported of an answer.
+/// The fit that is reported of a posture and all that explains the points about as well.
 pub(crate) fn report(problem: &Problem<'_>, answer: &PostureModes) -> Fit {
     let prepared = problem.prepared;
     let model = prepared.model;

@@ -2,8 +2,7 @@
 
 use geometry::{Point, Pose, Vector};
 
-use super::FINE_REACH;
-use super::placed::{NearFacet, Placed};
+use super::placed::{FINE_REACH, NearFacet, Placed};
 use crate::problem::Problem;
 use crate::state::Hypothesis;
 

@@ -5,10 +5,12 @@
 use geometry::NearestField;
 use geometry::depth::{LANES, Lanes, Rows, lanes, transform, transform_lanes};
 
-use super::FINE_REACH;
 use crate::model::Fields;
 use crate::state::Hypothesis;
 use crate::{MeasuredScene, Prepared};
+
+/// Distance from which the coarse field answers, metres: just inside the fine field's reach.
+pub(super) const FINE_REACH: f64 = 0.026;
 
 /// A facet of a link next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,6 +14,13 @@ struct Chunks {
 
 const CHUNKS: Chunks = Chunks { n: 8, least: 1024, most: 16_384 };
 
+/// Points that one thread works on at a time, of `n`: few enough that threads end together, as many
+/// as make what is joined after them worth it. Sums are taken chunk by chunk, so it does not depend
+/// on the threads.
+pub(crate) fn chunk(n: usize) -> usize {
+    (n / 16).clamp(1024, 8192)
+}
+
 /// Points of a scene, with the triangles that their beams met last.
 #[derive(Debug, Clone)]
 pub(crate) struct AdjustPoints {

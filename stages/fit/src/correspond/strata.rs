@@ -5,8 +5,8 @@ use geometry::Aabb;
 use geometry::depth::{Rows, transform};
 use std::borrow::Cow;
 
-use super::placed::{NearFacet, Placed};
-use super::{AdjustPoints, FINE_REACH, chunk};
+use super::placed::{FINE_REACH, NearFacet, Placed};
+use super::sampled::{AdjustPoints, chunk};
 use crate::problem::Problem;
 use crate::state::Hypothesis;
 

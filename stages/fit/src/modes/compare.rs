@@ -5,8 +5,8 @@
 //! alone do not tell. A wrist among the points of what hangs on it is drawn to them, which beams do
 //! tell.
 
-use super::Settled;
 use super::settings::{MODES, RivalLimits};
+use super::settled::Settled;
 use crate::correspond::worsening;
 use crate::problem::{JudgedPosture, Judgement, Problem, SweepSteps, links_apart, margin};
 use crate::refine::Refined;

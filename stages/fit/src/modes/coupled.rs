@@ -6,8 +6,8 @@ use geometry::angle;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
-use super::JointModes;
 use super::settings::MODES;
+use super::settled::JointModes;
 use crate::adjust::{Adjust, Adjusted, Normal};
 use crate::correspond::{AdjustPoints, worsening};
 use crate::problem::Problem;

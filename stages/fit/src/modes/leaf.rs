@@ -5,9 +5,9 @@
 use geometry::angle;
 use std::f64::consts::TAU;
 
-use super::JointModes;
 use super::profile::JointProfile;
 use super::settings::MODES;
+use super::settled::JointModes;
 use crate::problem::Problem;
 use crate::state::Hypothesis;
 

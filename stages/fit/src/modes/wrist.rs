@@ -8,8 +8,8 @@
 use geometry::{Point, angle};
 use std::f64::consts::TAU;
 
-use super::JointModes;
 use super::settings::{MODES, WristLimits};
+use super::settled::JointModes;
 use crate::adjust::{Adjust, Adjusted};
 use crate::correspond::{AdjustPoints, spheres};
 use crate::problem::{AdjustState, Problem};

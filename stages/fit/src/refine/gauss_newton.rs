@@ -6,7 +6,7 @@
 use geometry::robust;
 use nalgebra::{DMatrix, DVector};
 
-use super::Round;
+use super::rounds::Round;
 use crate::correspond::{Matching, chunk, pierced};
 use crate::problem::{Problem, add_priors, keep_slides, residual_row};
 use crate::state::Hypothesis;

@@ -1,6 +1,7 @@
 //! Everything that was measured in a region, as fits of any model read it: what beams and points
 //! say of a place, and the points with their views.
 
+mod measured;
 mod noise;
 
 use contract::{Fan, InstallationPlane, Region, View};
@@ -13,14 +14,7 @@ use std::sync::Arc;
 
 use crate::state::Hypothesis;
 use crate::{Prepared, Settings};
-
-/// A measured point, local frame.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Measured {
-    pub(crate) p: [f32; 3],
-    /// Index of its view.
-    pub(crate) view: u16,
-}
+use measured::Measured;
 
 /// Points of a scene that may be a robot's, as indices into its points, ascending.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use contract::{Fan, View};
 use geometry::robust::median;
 use nalgebra::{Matrix3, Vector3};
 
-use super::Measured;
+use super::measured::Measured;
 
 /// Noise that is assumed where the points do not tell (shuffled files), metres: a common scanner on
 /// dark steel.

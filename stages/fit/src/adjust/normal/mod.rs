@@ -6,15 +6,17 @@
 //! `A_c = Σ w J φᵀ`, `R_c = Σ w r φ`, `W_c = Σ w φ φᵀ`.
 
 mod covariance;
+mod patch_sums;
 mod shape;
 
 use contract::Fan;
 use geometry::robust;
-use nalgebra::{DMatrix, DMatrixView, DVector, Dyn, OMatrix, U5};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
-use crate::model::{Patches, Shape, ShapeSquare, Smoothness};
+use crate::model::{Patches, Shape, Smoothness};
 use crate::refine::add_scaled;
 use crate::state::N_SCAN;
+use patch_sums::PatchSums;
 use shape::PatchedSums;
 
 /// One residual.
@@ -34,34 +36,6 @@ pub(crate) struct ResidualRow<'a> {
     /// The residual, metres.
     pub(crate) r: f64,
 }
-
-/// Sums over one patch.
-#[derive(Debug, Clone)]
-struct PatchSums {
-    /// Σ w J φᵀ.
-    a: PatchColumns,
-    /// Its part of the gradient: Σ w J r, less what offsets explain once they are taken out.
-    g: DVector<f64>,
-    /// Σ w φ φᵀ.
-    weight: ShapeSquare,
-    /// Σ w r φ.
-    r: Shape,
-}
-
-impl PatchSums {
-    fn new(n: usize) -> Self {
-        let (a, g) = (PatchColumns::zeros(n), DVector::zeros(n));
-        Self { a, g, weight: ShapeSquare::zeros(), r: Shape::zeros() }
-    }
-
-    /// Σ w.
-    fn total(&self) -> f64 {
-        self.weight[(0, 0)]
-    }
-}
-
-/// A column for each.
-type PatchColumns = OMatrix<f64, Dyn, U5>;
 
 /// Residuals whose products are added together.
 const BATCH: usize = 64;

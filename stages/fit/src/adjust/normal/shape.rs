@@ -9,7 +9,7 @@ use contract::Fan;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix};
 use std::ops::Range;
 
-use super::PatchSums;
+use super::patch_sums::PatchSums;
 use crate::model::{Kernel, N_SMOOTH, PatchPlace, Patches, Shape, ShapeSquare, Smoothness};
 
 /// Lengths over which surfaces of castings, hulls and sheets are off alike, metres; the middle one
@@ -286,7 +286,7 @@ impl Offsets<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::PatchColumns;
+    use super::super::patch_sums::PatchColumns;
     use super::*;
     use crate::model::HALF_PATCH;
     use contract::OneByOne;
