@@ -12,7 +12,7 @@ mod common;
 use common::{Cell, N_BEAMS};
 use contract::OneByOne;
 use divan::{Bencher, black_box};
-use fit::{Prepared, Scene, Settings};
+use fit::{MeasuredScene, Prepared, Settings};
 use geometry::Pose;
 
 fn main() {
@@ -25,9 +25,11 @@ fn rounds(bencher: Bencher<'_, '_>) {
     let (region, views) = (cell.region(), cell.views(&cell.scans()));
     let (floors, settings) = ([cell.floor()], Settings::default());
     let prepared = Prepared::new(0, &cell.models[0], &OneByOne);
-    let scene = Scene::new(&region, &views, &floors, &settings, &OneByOne);
-    let start = (&Pose::identity(), &cell.posture[..]);
-    bencher.bench_local(|| black_box(fit::converge(&prepared, &scene, &settings, start)));
+    let scene = MeasuredScene::new(&region, &views, &floors, &settings, &OneByOne);
+    let (base, posture) = (Pose::identity(), &cell.posture[..]);
+    bencher.bench_local(|| {
+        black_box(fit::converge(&prepared, &scene, &settings, &base, posture));
+    });
 }
 
 #[divan::bench(sample_count = 5, sample_size = 1)]
@@ -36,7 +38,7 @@ fn whole(bencher: Bencher<'_, '_>) {
     let (region, views) = (cell.region(), cell.views(&cell.scans()));
     let (floors, settings) = ([cell.floor()], Settings::default());
     let prepared = Prepared::new(0, &cell.models[0], &OneByOne);
-    let scene = Scene::new(&region, &views, &floors, &settings, &OneByOne);
+    let scene = MeasuredScene::new(&region, &views, &floors, &settings, &OneByOne);
     let found = fit::fit(&cell.candidate(), &prepared, &scene, &settings, &OneByOne);
     let found = found.expect("the robot is found");
     bencher.bench_local(|| {

@@ -13,7 +13,7 @@ mod common;
 use common::{Cell, N_BEAMS};
 use contract::OneByOne;
 use divan::{Bencher, black_box};
-use fit::{Prepared, Scene, Settings};
+use fit::{MeasuredScene, Prepared, Settings};
 
 fn main() {
     divan::main();
@@ -27,7 +27,7 @@ fn search(bencher: Bencher<'_, '_>) {
     let usual = Settings::default();
     let settings = Settings { min_score: f64::INFINITY, n_refine: 1, n_polish: 1, ..usual };
     let prepared = Prepared::new(0, &cell.models[0], &OneByOne);
-    let scene = Scene::new(&region, &views, &floors, &settings, &OneByOne);
+    let scene = MeasuredScene::new(&region, &views, &floors, &settings, &OneByOne);
     let candidate = cell.candidate();
     bencher.bench_local(|| {
         black_box(fit::fit(&candidate, &prepared, &scene, &settings, &OneByOne).is_none())

@@ -173,8 +173,8 @@ impl Run<'_> {
         }
         review.accept(&mut fits);
         if settings.fit.together {
-            let (scans, still) = (&opened.sources.scans[..], &ground.surfaces.overlaps);
-            fit::together(&mut fits, &models, (scans, still), &settings.fit);
+            let (scans, still) = (&opened.sources.scans, &ground.surfaces.overlaps);
+            fit::together(&mut fits, &models, scans, still, &settings.fit);
         }
         let review = review.did(&without, &fits, &wrong);
         Ok(ReviewedRobots { robots: RobotList { fits, models }, review })

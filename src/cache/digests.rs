@@ -135,7 +135,7 @@ impl Digests {
     pub(crate) fn fits(&self, tiles: &[Key], settings: &Settings) -> Key {
         let s = settings;
         let ground = words(&(&s.lattice, &s.floor, &s.cluster, &s.region));
-        let search = words(&(&s.view, &s.base_search, &s.fit, &s.paper, &s.robot));
+        let search = words(&(&s.view, &s.base_search, &s.method, &s.fit, &s.paper, &s.robot));
         Key::of("fits", &[&words(&tiles), &self.library, &ground, &search])
     }
 

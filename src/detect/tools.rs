@@ -4,7 +4,7 @@
 use super::search::{PreparedLibrary, Search};
 use crate::engine::{AllThreads, Engine, Task};
 use contract::{Certainty, Fit, JointFit, Mounted, Result, Verdict};
-use fit::{Prepared, Scene, Settings, Tooled};
+use fit::{ArmWithTool, MeasuredScene, Prepared, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
 
@@ -59,7 +59,7 @@ pub(crate) fn attach_tools(
 
 /// The same for a fit of one scene; with the model that it is of, where that is none of these.
 pub(crate) fn attach_tools_in(
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     fit: Fit,
     models: &[Model],
     library: &PreparedLibrary<'_>,
@@ -113,7 +113,7 @@ fn attach_one(
     arm: &Model,
     models: &[Model],
     library: &PreparedLibrary<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
 ) -> Option<WithTool> {
     // An arm whose loops stand otherwise has the links of its name.
@@ -122,11 +122,12 @@ fn attach_one(
     let n_arm = arm.free.len();
     let ([tool, flange], mut start) = best_tool(fit, arm, models, library, bare, scene, settings)?;
     let both = arm.with_tool(&models[tool], flange, 0.0);
-    let prepared = Prepared::joined(&[bare, library.prepared(tool)], (fit.model, &both));
+    let prepared = Prepared::joined(&[bare, library.prepared(tool)], fit.model, &both);
     let holes = holes();
     let way = arm.mount(flange).1;
     let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
-    let bolts = fit::bolt(&start, (&prepared, n_arm - 1), &turns, scene, settings, &AllThreads);
+    let tooled = with_arm(&prepared, arm);
+    let bolts = fit::bolt(&start, tooled, &turns, scene, settings, &AllThreads);
     // Where the flange does not tell, the first hole has it, and the last joint takes up the rest.
     let bolt = bolts.iter().find(|b| b.hole == 0).or(bolts.first());
     let mount = bolt.map_or(0.0, |bolt| {
@@ -134,8 +135,9 @@ fn attach_one(
         holes[bolt.hole]
     });
     let both = arm.with_tool(&models[tool], flange, mount);
-    let prepared = Prepared::joined(&[bare, library.prepared(tool)], (fit.model, &both));
-    let mut together = fit::fit_tool(&start, (&prepared, n_arm - 1), scene, settings, &AllThreads);
+    let prepared = Prepared::joined(&[bare, library.prepared(tool)], fit.model, &both);
+    let tooled = with_arm(&prepared, arm);
+    let mut together = fit::fit_tool(&start, tooled, scene, settings, &AllThreads);
     let own = together.links.get(arm.links.len()..).unwrap_or_default();
     let n_points: usize = own.iter().map(|link| link.n_points).sum();
     if n_points < MIN_POINTS
@@ -168,16 +170,16 @@ fn best_tool(
     models: &[Model],
     library: &PreparedLibrary<'_>,
     bare: &Prepared<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
 ) -> Option<([usize; 2], Tooled)> {
-    let own = [arm.free.len(), arm.links.len()];
     let mut best: Option<([usize; 2], Tooled)> = None;
     for flange in arm.flanges() {
         for tool in (0..models.len()).filter(|&i| models[i].is_tool()) {
             let both = arm.with_tool(&models[tool], flange, 0.0);
-            let prepared = Prepared::joined(&[bare, library.prepared(tool)], (fit.model, &both));
-            let found = fit::try_tool(fit, (&prepared, own), scene, settings, &AllThreads);
+            let prepared = Prepared::joined(&[bare, library.prepared(tool)], fit.model, &both);
+            let tooled = with_arm(&prepared, arm);
+            let found = fit::try_tool(fit, tooled, scene, settings, &AllThreads);
             let better = |f: &Tooled| best.as_ref().is_none_or(|(_, b)| f.explained > b.explained);
             if let Some(found) = found.filter(better) {
                 best = Some(([tool, flange], found));
@@ -187,10 +189,15 @@ fn best_tool(
     best
 }
 
+/// An arm with a tool, of which it knows what is the arm's.
+fn with_arm<'a>(prepared: &'a Prepared<'a>, arm: &Model) -> ArmWithTool<'a> {
+    ArmWithTool { prepared, n_joints: arm.free.len(), n_links: arm.links.len() }
+}
+
 /// The arm's last joint may be as far off as at the other holes, each with the joint's value there,
 /// radians: the tool's place is known, not what of it is the hole's and what the joint's.
 fn widen(last: &mut JointFit, alike: &[[f64; 2]]) {
-    let apart = alike.iter().map(|[_, value]| fit::turns::apart(*value, last.value));
+    let apart = alike.iter().map(|[_, value]| geometry::angle::apart(*value, last.value));
     let spread = apart.fold(0.0, f64::max);
     if !alike.is_empty() {
         last.certainty = Certainty::Undetermined;

@@ -5,7 +5,7 @@ use super::confusion::Confusion;
 use contract::words::{Unit, count};
 use contract::{Certainty, Error, Kind, Label, PointKind, Result};
 use export::{ResultFile, RobotEntry};
-use fit::turns;
+use geometry::angle;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use simulate::{TrueRobot, Truth};
 use std::collections::BTreeMap;
@@ -275,7 +275,7 @@ fn off(robot: &RobotEntry, truth: &BTreeMap<String, f64>) -> Vec<JointError> {
     let joints = robot.posture().filter_map(|joint| {
         let (name, value, truth) = (joint.name, joint.value, truth.get(joint.name)?);
         let slides = joint.unit == Unit::MILLIMETRES;
-        let error = if slides { value - truth } else { turns::from_to(*truth, value) };
+        let error = if slides { value - truth } else { angle::from_to(*truth, value) };
         let (sigma, certainty) = (joint.sigma, joint.certainty);
         Some(JointError { name: name.into(), error, sigma, certainty, slides })
     });

@@ -1,12 +1,14 @@
 //! A job: flags and configuration in, everything that a run needs to know out, checked once.
 
 mod memory;
+mod method;
 pub(crate) mod places;
 mod settings;
 pub(crate) mod units;
 mod value;
 
 pub use memory::{memory_bytes, memory_words};
+pub use method::Method;
 pub use settings::Settings;
 
 use crate::engine::CHANNEL_BYTES;

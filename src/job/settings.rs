@@ -2,6 +2,7 @@
 //! out. A key that no stage has is refused. `tests/house.rs` holds this list against the stages'
 //! own.
 
+use super::method::Method;
 use super::value::{Value, assign};
 use contract::{Error, Kind, Result};
 
@@ -11,6 +12,8 @@ macro_rules! settings {
         /// Tunables of all stages.
         #[derive(Debug, Clone, Default)]
         pub struct Settings {
+            /// How postures are found.
+            pub method: Method,
             $(
                 #[doc = concat!("Tunables of `", stringify!($kind), "`.")]
                 pub $room: $kind,
@@ -24,6 +27,9 @@ macro_rules! settings {
             /// No such name, or a value of another kind.
             pub fn set(&mut self, key: &str, value: &toml::Value) -> Result<()> {
                 let key = &present_name(key);
+                if key == METHOD {
+                    return assign(&mut self.method, key, value);
+                }
                 $($(
                     if key == concat!(stringify!($room), ".", stringify!($field)) {
                         return assign(&mut self.$room.$field, key, value);
@@ -36,14 +42,21 @@ macro_rules! settings {
             /// run.
             #[must_use]
             pub fn all(&self) -> Vec<(&'static str, toml::Value)> {
-                vec![$($((
+                let mut all = vec![$($((
                     concat!(stringify!($room), ".", stringify!($field)),
                     self.$room.$field.write(),
-                )),*),*]
+                )),*),*];
+                let first = all.iter().position(|(name, _)| name.starts_with("fit."));
+                all.insert(first.unwrap_or(all.len()), (METHOD, self.method.write()));
+                all
             }
         }
     };
 }
+
+/// The name of the method among the settings: it stands first among those of the stage `fit`,
+/// whose work it may hand to another stage.
+const METHOD: &str = "fit.method";
 
 settings! {
     ingest: ingest::Settings {
@@ -80,11 +93,11 @@ settings! {
         max_body,
     }
     fit: fit::Settings {
-        method, beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
+        beam, settle, n_search, n_judge, search_tolerance, max_step, n_refine, n_polish, thin,
         max_points, floor_band, min_noise, camera_noise, camera_alike, plane_sigma, guess_sigma,
         scan_sigma, together, calibrate, frame_sigma, determined_sigma, min_score, max_violation,
     }
-    paper: fit::paper::PaperSettings {
+    paper: baseline::Settings {
         voxel, n_neighbours, max_edge, foot_low, foot_high, max_height, geodesic_slack, max_bases,
         yaw_step, settle_steps, truncation, sparse_p, sparse_mu, sparse_rounds, sweep_step, window,
         near_symmetric, axis_weight, axis_span, gate, n_rounds,

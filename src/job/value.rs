@@ -1,5 +1,6 @@
 //! One setting: a TOML value in, a plain number or word out, and back.
 
+use super::method::Method;
 use contract::{Error, Kind, Result};
 use toml::Value as Toml;
 
@@ -57,7 +58,7 @@ impl Value for f32 {
     }
 }
 
-impl Value for fit::Method {
+impl Value for Method {
     fn kind() -> String {
         "\"beam\" or \"paper\"".into()
     }

@@ -3,7 +3,7 @@
 
 use crate::label::known_space::poses;
 use contract::{Fit, Verdict};
-use fit::Scene;
+use fit::MeasuredScene;
 use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
@@ -24,7 +24,7 @@ const ASKED: usize = 4000;
 pub(crate) fn is_the_same(
     fit: &Fit,
     model: &Model,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     other_session: &VisibilityQuery<'_>,
 ) -> bool {
     fit.verdict == Verdict::Trusted
@@ -37,7 +37,7 @@ pub(crate) fn is_the_same(
 fn strange(
     fit: &Fit,
     model: &Model,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     other_session: &VisibilityQuery<'_>,
 ) -> f64 {
     let base = Point::from(fit.world_from_base.translation.vector);

@@ -6,7 +6,7 @@ use crate::detect::search::Search;
 use crate::detect::tools::attach_tools_in;
 use crate::label::known_space::{poses, reach};
 use contract::{Fit, Region, Result, Verdict};
-use fit::Scene;
+use fit::MeasuredScene;
 use fit::verdict::{self, VerdictEvent};
 use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point, Pose, Vector};
@@ -176,7 +176,7 @@ fn anew(
     let base = Point::from(world_from_base.translation.vector);
     let is_here = |at: &Point| (at - base).norm() < SAME_PLACE;
     search.in_scene(&region, |scene, settings| {
-        let on_base = |scene: &Scene<'_>| {
+        let on_base = |scene: &MeasuredScene<'_>| {
             let fit = search.on_base(scene, bare, world_from_base);
             let is_same = |f: &Fit| is_the_same(f, &models[bare], scene, other_session);
             fit.map(|fit| (is_same(&fit), fit))

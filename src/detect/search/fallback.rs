@@ -6,7 +6,7 @@ use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
 use crate::engine::AllThreads;
 use base_search::RegionEvidence;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
-use fit::{Scene, Sights};
+use fit::{MeasuredScene, ScansOfRegion};
 use geometry::{Aabb, Point};
 use robot::Model;
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ impl Search<'_, '_> {
     /// Fits of robots on ceilings, walls and tilted plates.
     pub(super) fn on_mounts(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         sight: &RegionEvidence<'_>,
         is_wanted: &impl Fn(&Candidate) -> bool,
         tried: &mut TriedBases,
@@ -59,7 +59,7 @@ impl Search<'_, '_> {
     /// Fits of robots that hang beside trusted ones, where much is left that those do not explain.
     pub(super) fn hung_beside(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         sight: &mut RegionEvidence<'_>,
         fits: &[Fit],
         tried: &mut TriedBases,
@@ -77,7 +77,7 @@ impl Search<'_, '_> {
     /// what stands there may be bolted to a plate.
     fn hung(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         sight: &RegionEvidence<'_>,
         name: &str,
         is_wanted: &impl Fn(&Candidate) -> bool,
@@ -118,7 +118,7 @@ impl Search<'_, '_> {
     /// that, more bases of each model are looked at.
     pub(super) fn left_over(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         sight: &mut RegionEvidence<'_>,
         planes: &[InstallationPlane],
         fits: &[Fit],
@@ -135,7 +135,7 @@ impl Search<'_, '_> {
     /// trusted robot explains, all heights are tried.
     pub(super) fn on_stands(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         sight: &mut RegionEvidence<'_>,
         fits: &[Fit],
         is_wanted: &impl Fn(&Candidate) -> bool,
@@ -157,7 +157,7 @@ impl Search<'_, '_> {
     /// much is left, `None` where little is.
     fn pass_over(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         sight: &mut RegionEvidence<'_>,
         fits: &[Fit],
     ) -> Option<Vec<Point>> {
@@ -178,17 +178,16 @@ impl Search<'_, '_> {
         &self,
         fits: &[Fit],
         sight: RegionEvidence<'_>,
-        sights: &Sights<'_>,
+        scans: &ScansOfRegion<'_>,
     ) -> Vec<Fit> {
-        let gone = lattice::disagreement(sights.views, &AllThreads);
+        let gone = lattice::disagreement(scans.views, &AllThreads);
         if gone.len() < MIN_GONE {
             return Vec::new();
         }
-        let feet =
-            self.candidates(&sight.scan_by_scan(), sights.floors, 0.0, breadth(sights.floors));
+        let feet = self.candidates(&sight.scan_by_scan(), scans.floors, 0.0, breadth(scans.floors));
         let mut out: Vec<Fit> = Vec::new();
         let in_reach = |candidate: &&Candidate| {
-            let here = base(&candidate.bases[0].0) - sights.region.origin.coords;
+            let here = base(&candidate.bases[0].0) - scans.region.origin.coords;
             let reach = self.library.prepared(candidate.model).reach();
             let near = |p: &&[f32; 3]| (Point::from(p.map(f64::from)) - here).norm() < reach;
             gone.iter().filter(near).count() as f64 >= GONE_IN_REACH * gone.len() as f64
@@ -202,7 +201,7 @@ impl Search<'_, '_> {
             }
             let prepared = self.library.prepared(candidate.model);
             let settings = &self.settings.fit;
-            out.extend(fit::stays(candidate, prepared, sights, settings, &AllThreads));
+            out.extend(fit::stays(candidate, prepared, scans, settings, &AllThreads));
         }
         out
     }

@@ -10,11 +10,11 @@ use crate::cache::Cache;
 
 use crate::engine::AllThreads;
 use crate::engine::progress::Pieces;
-use crate::job::Settings;
+use crate::job::{Method, Settings};
 use crate::store::Store;
 use base_search::{BaseSearch, RegionEvidence};
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
-use fit::{Method, Prepared, Scene, Sights};
+use fit::{MeasuredScene, Prepared, ScansOfRegion};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use rayon::prelude::*;
 use robot::Model;
@@ -166,13 +166,9 @@ impl<'a, 'm> Search<'a, 'm> {
         let is_wanted = |c: &Candidate| c.bases.first().is_some_and(|b| wants(&base(&b.0)));
         let views = self.views(region)?;
         let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
-        if self.settings.fit.method == Method::Paper {
-            let means = (&self.settings.fit, &self.settings.paper);
-            let models = (0..self.library.models.len()).into_par_iter();
-            let robots = models.filter(|&m| !self.library.models[m].is_tool());
-            let fit = |m: usize| fit::paper::fit(self.library.prepared(m), &scene, &planes, means);
-            return Ok(robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect());
+        let scene = MeasuredScene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
+        if self.settings.method == Method::Paper {
+            return Ok(self.by_baseline(&scene, &planes));
         }
         let feet = about.map_or(*region, |(place, radius)| feet(region, &place, radius));
         let mut sight =
@@ -193,10 +189,20 @@ impl<'a, 'm> Search<'a, 'm> {
             fits.extend(self.hung_beside(&scene, &mut sight, &fits, &mut tried)?);
         }
         fits.extend(self.on_stands(&scene, &mut sight, &fits, &is_wanted, &mut tried)?);
-        let sights = Sights { region, views: &views, floors: &planes };
-        fits.extend(self.moved(&fits, sight, &sights));
+        let scans = ScansOfRegion { region, views: &views, floors: &planes };
+        fits.extend(self.moved(&fits, sight, &scans));
         fits.retain(|fit| wants(&base(&fit.world_from_base)));
         Ok(fits)
+    }
+
+    /// Fits of all robots of the library by the baseline.
+    fn by_baseline(&self, scene: &MeasuredScene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {
+        let (judging, settings) = (&self.settings.fit, &self.settings.paper);
+        let fit =
+            |m: usize| baseline::fit(self.library.prepared(m), scene, planes, judging, settings);
+        let models = (0..self.library.models.len()).into_par_iter();
+        let robots = models.filter(|&m| !self.library.models[m].is_tool());
+        robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
     /// Where robots of all models may stand on some planes, best base first, those that score so
@@ -231,7 +237,7 @@ impl<'a, 'm> Search<'a, 'm> {
     /// place far worse are not tried any more, nor are those that were tried before.
     fn fits(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         candidates: &[Candidate],
         tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
@@ -281,14 +287,19 @@ impl<'a, 'm> Search<'a, 'm> {
         let tool = before.tool.as_ref().map(|tool| tool.model.as_str());
         let parts = [before.model_name.as_str()].into_iter().chain(tool).filter_map(known);
         let parts: Vec<&Prepared<'_>> = parts.map(|part| self.library.prepared(part)).collect();
-        let prepared = Prepared::joined(&parts, (before.model, model));
+        let prepared = Prepared::joined(&parts, before.model, model);
         self.in_scene(region, |scene, settings| {
             fit::again(before, &prepared, scene, settings, &AllThreads)
         })
     }
 
     /// The fit of a model on a base that is known, in the scene of the region about it.
-    pub(crate) fn on_base(&self, scene: &Scene<'_>, model: usize, base: &Pose) -> Option<Fit> {
+    pub(crate) fn on_base(
+        &self,
+        scene: &MeasuredScene<'_>,
+        model: usize,
+        base: &Pose,
+    ) -> Option<Fit> {
         let bounds = scene.region.world_bounds();
         let normal = base.rotation * Vector::z();
         let offset = normal.dot(&base.translation.vector);
@@ -303,11 +314,11 @@ impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn in_scene<T>(
         &self,
         region: &Region,
-        work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
+        work: impl FnOnce(&MeasuredScene<'_>, &fit::Settings) -> T,
     ) -> Result<T> {
         let views = self.views(region)?;
         let planes = self.planes(region);
-        let scene = Scene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
+        let scene = MeasuredScene::new(region, &views, &planes, &self.settings.fit, &AllThreads);
         Ok(work(&scene, &self.settings.fit))
     }
 
@@ -316,7 +327,7 @@ impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn with_scene<T>(
         &self,
         fit: &Fit,
-        work: impl FnOnce(&Scene<'_>, &fit::Settings) -> T,
+        work: impl FnOnce(&MeasuredScene<'_>, &fit::Settings) -> T,
     ) -> Result<Option<T>> {
         let at = base(&fit.world_from_base);
         // Large regions overlap: an arm at the border of one is whole in the other.
@@ -339,7 +350,7 @@ impl<'a, 'm> Search<'a, 'm> {
     ) -> Result<Vec<(Pose, Vec<f64>)>> {
         let prepared = self.library.prepared(model);
         self.in_scene(region, |scene, settings| {
-            let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, scene, settings, (&s.0, &s.1));
+            let end = |s: &(Pose, Vec<f64>)| fit::converge(prepared, scene, settings, &s.0, &s.1);
             starts.par_iter().map(end).collect()
         })
     }

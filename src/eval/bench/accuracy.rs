@@ -14,10 +14,9 @@ use super::{draw, other_tables, plot, table};
 use crate::detect::library;
 use crate::detect::search::PreparedLibrary;
 use crate::engine::Engine;
-use crate::job::Means;
+use crate::job::{Means, Method};
 use contract::{Error, Kind, Result};
 use export::atomic;
-use fit::Method;
 use robot::Model;
 use std::path::Path;
 use std::time::Instant;
@@ -114,7 +113,7 @@ fn run(
             _ => Then::Nothing,
         };
         match case.condition.way {
-            Way::Sequential | Way::SequentialAdjusted => settings.fit.method = Method::Paper,
+            Way::Sequential | Way::SequentialAdjusted => settings.method = Method::Paper,
             Way::ScansHeld => settings.fit.scan_sigma[..2].fill(HELD),
             Way::Whole | Way::FromTruth => {}
         }

@@ -5,8 +5,7 @@ use super::condition::DrawnCase;
 use super::draw::{DrawnCell, Mount};
 use super::labels::LabelScores;
 use contract::{Calibration, Error, Fit, Verdict};
-use fit::turns;
-use geometry::{Point, Pose, Vector};
+use geometry::{Point, Pose, Vector, angle};
 use robot::{JointKind, Model, Role};
 use serde::Serialize;
 
@@ -136,7 +135,7 @@ impl AccuracyRow {
         let n = model.free.len();
         let Some(((_, from_truth), ends)) = found.ends.split_first() else { return self };
         let home = |(_, posture): &&Start| {
-            let near = |j: usize, other: &[f64]| turns::apart(posture[j], other[j]) < RIGHT;
+            let near = |j: usize, other: &[f64]| angle::apart(posture[j], other[j]) < RIGHT;
             (0..n.saturating_sub(1)).all(|j| near(j, &drawn.posture) || near(j, from_truth))
         };
         self.perturbed_deg = case.condition.perturbed_deg;
@@ -264,7 +263,7 @@ fn joints(model: &Model, fit: &Fit, posture: &[f64], mount: Option<&Mount>) -> V
         |j: usize| mount.filter(|m| m.n_arm == j + 1).map_or(0.0, |m| m.way * (bolted - m.turn));
     let each = fit.joints.iter().zip(posture).enumerate().map(|(j, (joint, truth))| {
         let slides = model.joints[model.free[j]].kind == JointKind::Prismatic;
-        let whole = |e: f64| if slides { e } else { turns::from_to(0.0, e) };
+        let whole = |e: f64| if slides { e } else { angle::from_to(0.0, e) };
         let error = joint.value - truth + turned(j);
         JointRow {
             rough: fit.rough.get(j).map(|v| whole(v - truth)),
@@ -284,12 +283,12 @@ fn joints(model: &Model, fit: &Fit, posture: &[f64], mount: Option<&Mount>) -> V
 fn bolted_elsewhere(mount: &Mount, joint: usize, fit: &Fit, posture: &[f64]) -> bool {
     let Some(tool) = fit.tool.as_ref().filter(|_| mount.n_arm == joint + 1) else { return false };
     let error = |[hole, value]: &[f64; 2]| value - posture[joint] + mount.way * (hole - mount.turn);
-    tool.alike.iter().map(error).any(|e| turns::apart(e, 0.0) < NEARLY_RIGHT)
+    tool.alike.iter().map(error).any(|e| angle::apart(e, 0.0) < NEARLY_RIGHT)
 }
 
 /// Whether what is claimed of a joint holds.
 fn is_right(joint: &JointRow, index: usize, fit: &Fit) -> bool {
-    let near = |e: f64| turns::apart(e, 0.0) < RIGHT;
+    let near = |e: f64| angle::apart(e, 0.0) < RIGHT;
     if near(joint.error) {
         return true;
     }

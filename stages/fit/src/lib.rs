@@ -4,21 +4,22 @@
 //! search over the joints on depth images (`search`), Gauss–Newton over base and joints on thinned
 //! points (`refine`), one adjustment of base, joints and scan errors on many points (`adjust`), all
 //! other postures that explain the points as well (`modes`), and the report with its verdict
-//! (`assess`). `solve.rs` holds their order and every loop over alternatives. Below all phases lie
-//! what they share: the model made ready (`model`), the region (`scene`), what is asked
-//! (`problem`), a posture and the errors of scans (`state`), and which point belongs to which
-//! surface (`correspond`).
+//! (`assess`). `solve.rs` holds their order and every loop over alternatives. All phases share the
+//! model made ready (`model`), the region (`scene`), what is asked and what the beams say of a
+//! posture (`problem`), a posture and the errors of scans (`state`), and which point belongs to
+//! which surface (`correspond`).
 //!
-//! Beside it stand the fit of tools ([`fit_tool`]), the places of joints on their links
-//! ([`calibrate()`]), scans in which a robot stands differently ([`stays`](fn@stays)), the choice
-//! among fits that claim the same points ([`choose`](fn@choose)), and the common adjustment of all
-//! robots ([`together`]). Method and maths: METHOD.md §8–§18.
+//! Beside [`fit`] stand the fit of tools ([`fit_tool`]), the places of joints on their links
+//! ([`calibrate()`]), scans in which a robot stands differently ([`stays`]), the choice among fits
+//! that claim the same points ([`choose`]), and the common adjustment of all robots ([`together`]).
+//! A posture that another method found is judged by [`report_estimate`]. METHOD.md §8–§18 has
+//! method and maths.
 //!
 //! Lengths are metres, angles radians. `world_from_base` takes base to world coordinates.
 //!
 //! ```
 //! use contract::{Candidate, Fit, InstallationPlane, OneByOne, Region, View};
-//! use fit::{Prepared, Scene, Settings};
+//! use fit::{MeasuredScene, Prepared, Settings};
 //!
 //! /// The fit of a model where it may stand, by the views of a region with these planes;
 //! /// `None` where nothing that was measured comes near the model.
@@ -31,7 +32,7 @@
 //! ) -> Option<Fit> {
 //!     let settings = Settings::default();
 //!     let prepared = Prepared::new(candidate.model, model, &OneByOne);
-//!     let scene = Scene::new(region, views, planes, &settings, &OneByOne);
+//!     let scene = MeasuredScene::new(region, views, planes, &settings, &OneByOne);
 //!     fit::fit(candidate, &prepared, &scene, &settings, &OneByOne)
 //! }
 //! ```
@@ -40,14 +41,9 @@
 mod adjust;
 mod assess;
 mod calibrate;
-mod choose;
 mod correspond;
-#[cfg(test)]
-mod cubes;
-mod judge;
 mod model;
 mod modes;
-pub mod paper;
 mod plant;
 mod problem;
 mod refine;
@@ -56,17 +52,14 @@ mod search;
 mod settings;
 mod solve;
 mod state;
-mod stays;
 mod tool;
-pub mod turns;
 pub mod verdict;
 
+pub use assess::{PostureEstimate, report_estimate};
 pub use calibrate::{calibrate, combine};
-pub use choose::choose;
-pub use model::Prepared;
-pub use plant::together;
-pub use scene::Scene;
-pub use settings::{Method, Settings};
+pub use model::{Facet, Prepared};
+pub use plant::{ScansOfRegion, choose, stays, together};
+pub use scene::MeasuredScene;
+pub use settings::Settings;
 pub use solve::{again, converge, fit};
-pub use stays::{Sights, stays};
-pub use tool::{Bolt, Tooled, bolt, fit_tool, try_tool};
+pub use tool::{ArmWithTool, Bolt, Tooled, bolt, fit_tool, try_tool};

@@ -1,20 +1,8 @@
-//! What is tuned in the fit, with unit and reason.
-
-/// How postures are found.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Method {
-    /// Beam search over the whole chain with free space, then one adjustment of everything.
-    #[default]
-    Beam,
-    /// The source's: link after link.
-    Paper,
-}
+//! Settings of the fit, with units and reasons.
 
 /// Tunables of search, refinement and verdict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// How postures are found.
-    pub method: Method,
     /// Hypotheses kept at each joint of the beam. METHOD.md §8: 150 lost none of 60; 100 lose at
     /// most one of 200.
     pub beam: usize,
@@ -48,7 +36,7 @@ pub struct Settings {
     /// see arms, alike over a link's width: what is even over a hand's width shows a part of
     /// that.
     pub camera_noise: f64,
-    /// So many of its points err alike: those of a hand's width.
+    /// Number of a depth camera's points that err alike: those of a hand's width.
     pub camera_alike: f64,
     /// Standard deviation of the base about the installation plane, metres and radians: feet are
     /// shimmed and floors wavy.
@@ -86,7 +74,6 @@ impl Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            method: Method::Beam,
             beam: 100,
             settle: 40,
             n_search: 100,

@@ -6,7 +6,7 @@
 //! | search the joints with beams | [`Hypothesis`] | `search` |
 //! | refine base and joints on thinned points | [`Refined`] | `refine` |
 //! | adjust base, joints and scans on many points | [`Settled`] | `adjust` |
-//! | find all that explains the points as well | [`Answer`] | `modes` |
+//! | find all that explains the points as well | [`PostureModes`] | `modes` |
 //! | state how well everything is known, and judge | [`Fit`] | `assess` |
 //!
 //! No phase calls an earlier one. Where another posture has to be refined and adjusted in turn, the
@@ -21,17 +21,16 @@ use crate::adjust::{Adjust, on_whole_beams};
 use crate::assess::{refused, report};
 use crate::calibrate::doubt_places;
 use crate::correspond::{AdjustPoints, adjusted_points};
-use crate::judge::{Judgement, judged};
 use crate::modes::{
-    Answer, MODES, OtherEnd, OtherLoops, Settled, WristModes, ahead, bends, better_leaves,
+    MODES, OtherEnd, OtherLoops, PostureModes, Settled, WristModes, ahead, bends, better_leaves,
     close_rivals, gain, is_on_its_way, leaf_modes, other_loops, slides,
 };
-use crate::problem::{Prior, Problem, SweepSteps};
+use crate::problem::{Judgement, Prior, Problem, SweepSteps, judged};
 use crate::refine::{COARSE_ROUNDS, Refined, approach, best_first, coarse, polish, polish_near};
 use crate::search::BeamSearch;
 use crate::state::Hypothesis;
 use crate::verdict::{self, is_lost};
-use crate::{Prepared, Scene, Settings};
+use crate::{MeasuredScene, Prepared, Settings};
 
 /// Score of the best posture so far below which no other wrist makes it a robot.
 ///
@@ -51,27 +50,37 @@ struct HopelessScore {
 const HOPELESS_SCORE: HopelessScore = HopelessScore { scanner: 0.45, camera: 0.25, points: 0.1 };
 /// Score of a base from which on the full search is made at once.
 const CLEAR_BASE: f64 = 0.35;
-/// Hypotheses of a quick look: kept at each joint, settled, and refined.
-const QUICK_BEAM: usize = 25;
-const QUICK_SETTLED: usize = 8;
-const QUICK_REFINED: usize = 3;
+/// Hypotheses of a quick look.
+struct QuickLook {
+    /// Kept at each joint.
+    beam: usize,
+    settled: usize,
+    refined: usize,
+}
+
+const QUICK: QuickLook = QuickLook { beam: 25, settled: 8, refined: 3 };
+
+/// One point of so many of the last adjustment is enough to choose what it is made of, where that
+/// is more than links have at least.
+struct SettledPart {
+    scanner: usize,
+    /// Of depth cameras, whose errors are alike over a hand's width: a wrist in eight views was
+    /// lost with fewer points.
+    camera: usize,
+}
+
+const SETTLED_PART: SettledPart = SettledPart { scanner: 30, camera: 15 };
 /// Most rounds in which the best one's wrist is flipped and bent, where another takes its place.
 const N_WRIST_ROUNDS: usize = 3;
 /// Most times that the wrist of the answer is bent.
 const N_BENDS: usize = 2;
-/// One point of so many of the last adjustment is enough to choose what it is made of, where that
-/// is more than links have at least.
-const SETTLED_PART: usize = 30;
-/// The same of depth cameras, whose errors are alike over a hand's width: a wrist in eight views
-/// was lost with fewer points.
-const SETTLED_PART_OF_CAMERAS: usize = 15;
 
 /// Fits the candidate's model in the scene; `None` where nothing comes near.
 #[must_use]
 pub fn fit(
     candidate: &Candidate,
     prepared: &Prepared<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Option<Fit> {
@@ -125,7 +134,7 @@ fn fit_from(problem: &Problem<'_>, bases: &[Pose]) -> Option<Fit> {
 pub fn again(
     before: &Fit,
     prepared: &Prepared<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Option<Fit> {
@@ -149,9 +158,10 @@ pub fn again(
 #[must_use]
 pub fn converge(
     prepared: &Prepared<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
-    (world_from_base, posture): (&Pose, &[f64]),
+    world_from_base: &Pose,
+    posture: &[f64],
 ) -> (Pose, Vec<f64>) {
     let start = scene.hypothesis(world_from_base, posture.to_vec());
     let nearby = scene.nearby(prepared, &Point::from(start.local_from_base.translation.vector));
@@ -172,7 +182,7 @@ fn is_promising(problem: &Problem<'_>, bases: &[Pose]) -> bool {
     found.is_some_and(|found| found.judgement.score >= hopeless(problem.scene))
 }
 
-fn hopeless(scene: &Scene<'_>) -> f64 {
+fn hopeless(scene: &MeasuredScene<'_>) -> f64 {
     match (scene.evidence.has_beams(), scene.has_camera()) {
         (true, false) => HOPELESS_SCORE.scanner,
         (true, true) => HOPELESS_SCORE.camera,
@@ -183,9 +193,9 @@ fn hopeless(scene: &Scene<'_>) -> f64 {
 /// A quick look with few hypotheses: the best posture.
 pub(crate) fn quick(problem: &Problem<'_>, bases: &[Pose]) -> Option<Refined> {
     let settings = Settings {
-        beam: QUICK_BEAM,
-        settle: QUICK_SETTLED,
-        n_refine: QUICK_REFINED,
+        beam: QUICK.beam,
+        settle: QUICK.settled,
+        n_refine: QUICK.refined,
         n_polish: 1,
         ..problem.settings.clone()
     };
@@ -231,7 +241,7 @@ fn add_found_beside(
 /// Adjusts a posture; where another value of its leaf joints fits the points better, that one.
 pub(crate) fn settle(problem: &Problem<'_>, h: &Hypothesis) -> Settled {
     let Problem { prepared, scene, settings, .. } = *problem;
-    let part = if scene.has_camera() { SETTLED_PART_OF_CAMERAS } else { SETTLED_PART };
+    let part = if scene.has_camera() { SETTLED_PART.camera } else { SETTLED_PART.scanner };
     let mut points = adjusted_points(problem, h, settings.max_points / part);
     let loose: Vec<usize> = (0..h.posture.len()).filter(|&j| prepared.leaf[j]).collect();
     let adjust = Adjust::new(problem);
@@ -323,7 +333,7 @@ pub(crate) fn finish(problem: &Problem<'_>, mut best: Settled, others: &[Refined
         false => other.clone(),
     };
     let others = problem.fan.fan(others.iter().collect(), at_rest);
-    let mut fit = report(problem, &Answer { best, points, wrist, others });
+    let mut fit = report(problem, &PostureModes { best, points, wrist, others });
     verdict::note(&mut fit, misfits);
     fit
 }

@@ -1,9 +1,7 @@
 //! What every phase of a fit passes on: a base pose with a posture, and the errors of scans.
 
-use geometry::{Pose, Vector};
+use geometry::{Pose, Vector, angle};
 use nalgebra::{Translation3, UnitQuaternion};
-
-use crate::turns;
 
 /// A base pose and a posture, of which a search may have set the first joints only.
 #[derive(Debug, Clone)]
@@ -32,7 +30,7 @@ impl Hypothesis {
 
     /// Difference of a joint between two postures, without whole turns, radians.
     pub(crate) fn turn(&self, other: &Self, joint: usize) -> f64 {
-        turns::apart(self.posture[joint], other.posture[joint])
+        angle::apart(self.posture[joint], other.posture[joint])
     }
 }
 
@@ -52,7 +50,7 @@ pub(crate) struct ScanError {
     pub(crate) shift: Vector,
     /// Turn of its points about the scanner, radians, local axes.
     pub(crate) turn: Vector,
-    /// Its ranges are too long by this, metres.
+    /// Range bias: the scan's ranges are too long by this, metres.
     pub(crate) bias: f64,
 }
 

@@ -1,6 +1,6 @@
-//! The verdict on a fit, and the only file that writes one. The evidence of a fit in; verdict and
-//! reasons in words out, by the rules of `verdict/table.rs` (METHOD.md §15). What is found out
-//! later (another model, a review, a rescan) is reported here as a [`VerdictEvent`].
+//! Decides the verdict on a fit; no other file writes one. Verdict and reasons follow from the
+//! evidence of the fit by the rules of `verdict/table.rs` (METHOD.md §15). What is found out later
+//! (another model, a review, a rescan) is reported here as a [`VerdictEvent`].
 
 mod evidence;
 #[cfg(test)]
@@ -14,7 +14,7 @@ mod words;
 
 use contract::{Fit, Verdict};
 
-use crate::Scene;
+use crate::MeasuredScene;
 use crate::adjust::Adjusted;
 use evidence::FitEvidence;
 pub(crate) use evidence::JudgedFit;
@@ -33,7 +33,7 @@ pub enum VerdictEvent<'a> {
     ScansAgree(usize),
     /// Another model explains this share of the surface that the fit explains, of the same points.
     RivalModel {
-        /// Its name in the library.
+        /// Name of the model in the library.
         model: &'a str,
         /// Surface explained by it, as a share of that explained by the fit.
         share: f64,
@@ -97,14 +97,14 @@ fn holds_any(evidence: &FitEvidence, asked: AlsoAsked) -> bool {
 
 /// Whether what was adjusted is sure to be refused, whatever its wrist: its points are near the
 /// model, not on it.
-pub(crate) fn is_lost(best: &Adjusted, scene: &Scene<'_>) -> bool {
+pub(crate) fn is_lost(best: &Adjusted, scene: &MeasuredScene<'_>) -> bool {
     holds_any(&FitEvidence::before_report(best, scene), AlsoAsked::BeforeReport)
 }
 
 /// Whether nothing that was measured contradicts a fit. If such a fit is doubtful, then because too
 /// little of it was seen.
 #[must_use]
-pub fn is_uncontradicted(fit: &Fit, scene: &Scene<'_>) -> bool {
+pub fn is_uncontradicted(fit: &Fit, scene: &MeasuredScene<'_>) -> bool {
     fit.verdict != Verdict::Refused
         && !holds_any(&FitEvidence::of_surface(fit, scene), AlsoAsked::Contradicts)
 }

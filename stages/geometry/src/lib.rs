@@ -26,6 +26,7 @@
 #![forbid(unsafe_code)]
 
 pub mod aabb;
+pub mod angle;
 pub mod depth;
 pub mod direction;
 pub mod evidence;

@@ -1,14 +1,14 @@
-//! Points of an adjustment without those on an open flange whose beams ended on more than one
-//! plane: beams have a width.
+//! Leaves out of an adjustment the points on an open flange whose beams ended on more than one
+//! plane, since a beam has a width.
 //!
-//! What stands out from such a flange is in one place of many; its points pull at the wrist
-//! whichever way the flange is turned, and so does what a scanner makes of beams that end half
-//! beside an edge.
+//! What stands out from such a flange is in one place of many. Its points pull at the wrist
+//! whichever way the flange is turned, and so do the points that a scanner makes of beams that end
+//! half beside an edge.
 
 use geometry::Vector;
 use std::f64::consts::TAU;
 
-use super::Adjust;
+use super::adjustment::Adjust;
 use crate::correspond::{AdjustPoints, MetTriangle, Pairing, SurfacePair};
 use crate::model::BeamPlace;
 use crate::problem::{AdjustState, Problem};
@@ -21,9 +21,9 @@ struct BeamWidth {
     growth: f64,
 }
 
-/// That of the mixed pixels that are measured (`simulate`).
+/// Footprint of the mixed pixels that are measured (`simulate`).
 const BEAM: BeamWidth = BeamWidth { radius: 0.0011, growth: 0.000_15 };
-/// So many places on a beam's rim are looked at.
+/// Places on a beam's rim that are looked at.
 const N_RIM: usize = 6;
 /// A beam ended on one plane where its rim is no farther from it, metres: what tessellation of the
 /// model leaves (`correspond/pairs.rs`).
@@ -102,7 +102,7 @@ fn is_whole(pairing: &Pairing<'_>, pair: &SurfacePair) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cubes::before_front;
+    use crate::problem::before_front;
 
     #[test]
     fn beams_that_end_half_beside_an_edge_are_left_out_on_the_links_asked_about() {

@@ -1,4 +1,5 @@
-//! How many points lie on each link and how far off, and how noisy they are by that.
+//! Statistics of the points of an adjustment: how many lie on each link, how far off they are, and
+//! the noise that follows from that.
 
 use crate::correspond::SurfacePair;
 

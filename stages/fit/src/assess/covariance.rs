@@ -1,5 +1,5 @@
-//! The covariance that is reported: widened by what an adjustment's parabola misses, in the axes
-//! that are asked for, and carried to the tip; and what the points say of the scans' errors
+//! The covariance that is reported: widened by what the parabola of an adjustment misses, in the
+//! axes that are asked for, and carried to the tip; and what the points say of the scans' errors
 //! (METHOD.md §14, §18).
 
 use contract::{ScanShare, ScanShift};
@@ -8,14 +8,14 @@ use nalgebra::{DMatrix, DVector};
 use robot::Model;
 
 use crate::adjust::Adjusted;
-use crate::modes::{Answer, JointModes, coupled_spread, marginal_spread};
+use crate::modes::{JointModes, PostureModes, coupled_spread, marginal_spread};
 use crate::problem::Problem;
 
 /// Adds to the covariance of the joints what their valleys, others that may stand elsewhere and the
 /// wrist leave open.
 pub(super) fn widen(
     problem: &Problem<'_>,
-    answer: &Answer,
+    answer: &PostureModes,
     several: &[&JointModes],
     in_base: &mut DMatrix<f64>,
 ) {

@@ -2,16 +2,16 @@
 //! explain the points as well (METHOD.md §14.3).
 
 use contract::{Certainty, Equal, JointFit};
+use geometry::angle;
 use nalgebra::DMatrix;
 use robot::{Model, Motion};
 use std::f64::consts::TAU;
 
-use super::Rival;
 use super::covariance::sigma_of;
+use super::rival::Rival;
 use crate::modes::{JointModes, MODES, closes_tool};
 use crate::problem::Problem;
 use crate::state::Hypothesis;
-use crate::turns;
 use crate::verdict::RIVAL;
 
 /// Standard deviation from which on a joint is open, radians: any value within degrees would do.
@@ -73,7 +73,7 @@ impl OpenJoints {
             is_open[s.joint] = true;
             let value = h.posture[s.joint];
             spread[s.joint] =
-                s.values.iter().map(|v| turns::apart(value, *v)).fold(spread[s.joint], f64::max);
+                s.values.iter().map(|v| angle::apart(value, *v)).fold(spread[s.joint], f64::max);
         }
     }
 }

@@ -1,32 +1,30 @@
-//! Last phase: an [`Answer`] becomes a fit as it is reported. Values with their standard
-//! deviations, which joints are open, rivals, postures that explain the points as well, and the
-//! verdict.
+//! Last phase: states how well everything is known, and judges the fit. The report has values with
+//! their standard deviations, which joints are open, rivals, postures that explain the points as
+//! well, and the verdict.
 
 mod covariance;
+mod estimate;
 mod joints;
+mod rival;
 
 use contract::{Certainty, Fit, JointFit, RunnerUp};
 use robot::Model;
 
 pub(crate) use covariance::tip_sigma;
+pub use estimate::{PostureEstimate, report_estimate};
 
 use crate::adjust::Adjusted;
-use crate::judge::{Judgement, evidence};
-use crate::modes::{Answer, JointModes, MODES, camera_spread, lead, reach_of_others, with_foot};
-use crate::problem::Problem;
-use crate::refine::Refined;
+use crate::modes::{
+    JointModes, MODES, PostureModes, camera_spread, lead, reach_of_others, with_foot,
+};
+use crate::problem::{Judgement, Problem, link_evidence};
 use crate::verdict::{self, JudgedFit, RIVAL, VerdictEvent};
 use covariance::{in_world_axes, scans, share, sigma_of, widen};
 use joints::{OpenJoints, differs, equals, joints};
+use rival::Rival;
 
-/// Another posture, and how clearly the best is better.
-struct Rival<'a> {
-    margin: f64,
-    other: &'a Refined,
-}
-
-/// What is reported of an answer.
-pub(crate) fn report(problem: &Problem<'_>, answer: &Answer) -> Fit {
+/// The fit that is reported of a posture and all that explains the points about as well.
+pub(crate) fn report(problem: &Problem<'_>, answer: &PostureModes) -> Fit {
     let prepared = problem.prepared;
     let model = prepared.model;
     let (best, judgement) = (&answer.best.adjusted, &answer.best.judgement);
@@ -69,7 +67,7 @@ pub(crate) fn report(problem: &Problem<'_>, answer: &Answer) -> Fit {
         tip_sigma: tip_sigma(model, &h.posture, &in_base),
         scans: scans(problem, best),
         share: share(problem, best),
-        links: evidence(prepared, judgement, &best.n_points, &best.link_rms),
+        links: link_evidence(prepared, judgement, &best.n_points, &best.link_rms),
         runner_up: other_answer.map(|rival| runner_up(model, judgement, rival)),
         equals: equals(problem, h, &rivals, &passed, &several),
         ..Fit::default()
@@ -80,7 +78,7 @@ pub(crate) fn report(problem: &Problem<'_>, answer: &Answer) -> Fit {
 }
 
 /// The others, the one that the best is least better than first.
-fn ranked<'o>(problem: &Problem<'_>, answer: &'o Answer) -> Vec<Rival<'o>> {
+fn ranked<'o>(problem: &Problem<'_>, answer: &'o PostureModes) -> Vec<Rival<'o>> {
     let (best, judgement) = (&answer.best.adjusted.hypothesis, &answer.best.judgement);
     let mut rivals: Vec<Rival<'o>> = problem.fan.fan(answer.others.iter().collect(), |other| {
         let [by_beams, by_points] = lead(problem, best, judgement, other);

@@ -1,4 +1,4 @@
-//! What several postures of one robot say together of the places of its joints (METHOD.md §17).
+//! Combines what several postures of one robot say of the places of its joints (METHOD.md §17).
 
 use contract::Calibration;
 use geometry::robust;

@@ -1,5 +1,5 @@
-//! Where the robot's joints really are on their links, as far as the points of its fit tell, and
-//! the fit of the robot so corrected (METHOD.md §17).
+//! Estimates where a robot's joints are on its links, as far as the points of its fit tell, and
+//! fits the robot with its joints there (METHOD.md §17).
 
 mod combine;
 mod places;
@@ -14,12 +14,11 @@ pub(crate) use places::doubt_places;
 use crate::adjust::Adjust;
 use crate::assess::report;
 use crate::correspond::adjusted_points;
-use crate::judge::judged;
-use crate::modes::{Answer, Settled, WristModes, better_leaves, leaf_modes};
-use crate::problem::Problem;
+use crate::modes::{PostureModes, Settled, WristModes, better_leaves, leaf_modes};
+use crate::problem::{Problem, judged};
 use crate::state::Hypothesis;
 use crate::verdict::{self, JudgedFit, VerdictEvent};
-use crate::{Prepared, Scene, Settings};
+use crate::{MeasuredScene, Prepared, Settings};
 use places::{OwnModel, estimate, open_beside, words};
 
 /// The robot's own model and its fit.
@@ -27,7 +26,7 @@ use places::{OwnModel, estimate, open_beside, words};
 pub fn calibrate(
     fit: &Fit,
     prepared: &Prepared<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> (Model, Fit) {
@@ -54,7 +53,7 @@ pub fn calibrate(
     Adjust::new(&problem).sums(&adjusted.state(), &mut points);
     let wrist = WristModes::of(&problem, &adjusted, &leaves, &points);
     let best = Settled { adjusted, judgement, leaves };
-    let mut out = report(&problem, &Answer { best, points, wrist, others: Vec::new() });
+    let mut out = report(&problem, &PostureModes { best, points, wrist, others: Vec::new() });
     let as_known = as_known(&nominal, fit, &h, &out);
     verdict::apply(&mut out, &VerdictEvent::Calibrated(as_known));
     let link_rms = fit.links.iter().zip(&out.links).map(|(b, a)| [b.rms, a.rms]).collect();

@@ -1,9 +1,9 @@
-//! Where a robot's joints are on their links, as far as the points of one fit tell, and whether
-//! that is where its model has them (METHOD.md §17).
+//! Estimates where a robot's joints are on its links, as far as the points of one fit tell, and
+//! whether that is where the model has them (METHOD.md §17).
 //!
 //! Each free joint gets a shift and a turn of its frame with a prior beside base, posture and scans
-//! in one adjustment; about (or along) its own axis it gets none, since the joint itself moves
-//! there: what a controller's zero is off by no scan of one posture can tell.
+//! in one adjustment. About (or along) its own axis it gets none, since the joint itself moves
+//! there: scans of one posture cannot tell the offset of a controller's zero.
 
 use contract::JointFrame;
 use nalgebra::{DMatrix, DVector};

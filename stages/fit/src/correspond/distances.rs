@@ -1,12 +1,11 @@
-//! How far points are from links of a posture, and by that which of two postures explains the
-//! points on the links that stand differently in them (METHOD.md §9).
+//! Distances of points from the links of a posture, and which of two postures explains the points
+//! better on the links that stand differently in them (METHOD.md §9).
 
 use geometry::Point;
 use geometry::depth::transform;
 
-use crate::judge::moved;
 use crate::model::Facet;
-use crate::problem::Problem;
+use crate::problem::{Problem, links_apart};
 use crate::state::Hypothesis;
 
 /// Points farther than this from everything count as if they were so far, metres.
@@ -57,7 +56,7 @@ impl Apart<'_> {
 /// How much worse another posture explains the points on the links that stand differently in it,
 /// see [`Apart::worsening`].
 pub(crate) fn worsening(problem: &Problem<'_>, best: &Hypothesis, other: &Hypothesis) -> f64 {
-    let links = moved([problem.prepared; 2], [best, other]);
+    let links = links_apart([problem.prepared; 2], [best, other]);
     Apart { best, other }.worsening(problem, problem, &links)
 }
 

@@ -1,9 +1,8 @@
-//! Points matched with the facet of a posture that is nearest to them, where they may lie on it.
+//! Matches points with the facet of a posture that is nearest to them, where they may lie on it.
 
 use geometry::{Point, Pose, Vector};
 
-use super::FINE_REACH;
-use super::placed::{NearFacet, Placed};
+use super::placed::{FINE_REACH, NearFacet, Placed};
 use crate::problem::Problem;
 use crate::state::Hypothesis;
 
@@ -49,7 +48,7 @@ impl<'a> Matching<'a> {
         }
     }
 
-    /// Those of the points that match, in their order.
+    /// Matches of the points that have one, in the order of the points.
     pub(crate) fn each(&self, points: &[u32], mut take: impl FnMut(Match)) {
         self.placed.nearest_each(self.problem.scene, points, |i, _, near| {
             near.and_then(|near| self.matched(i, near)).into_iter().for_each(&mut take);

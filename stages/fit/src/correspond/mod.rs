@@ -13,15 +13,5 @@ pub(crate) use distances::{Apart, CAP, MIN_POINTS, distances, spheres, squares, 
 pub(crate) use matching::Matching;
 pub(crate) use pairs::{MetTriangle, Pairing, SurfacePair};
 pub(crate) use pierced::pierced;
-pub(crate) use sampled::AdjustPoints;
+pub(crate) use sampled::{AdjustPoints, chunk};
 pub(crate) use strata::{PerLink, adjusted_points, some, stratified};
-
-/// Distance from which the coarse field answers, metres: just inside the fine field's reach.
-const FINE_REACH: f64 = 0.026;
-
-/// Points that one thread works on at a time, of `n`: few enough that threads end together, as many
-/// as make what is joined after them worth it. Sums are taken chunk by chunk, so it does not depend
-/// on the threads.
-pub(crate) fn chunk(n: usize) -> usize {
-    (n / 16).clamp(1024, 8192)
-}

@@ -1,5 +1,5 @@
-//! For each measured point the place on the model's surface that its beam ends on, and how far the
-//! point is from there, at a state of the adjustment.
+//! Finds for each measured point the place on the model's surface that its beam ends on, and the
+//! distance of the point from there, at a state of an adjustment.
 
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Matrix3, UnitQuaternion};
@@ -228,14 +228,14 @@ struct SurfaceHit {
     patch: u32,
     /// The surface's normal there, local frame.
     n: Vector,
-    /// How far the point is above it, metres.
+    /// Height of the point above the surface, metres.
     r: f64,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cubes::seen;
+    use crate::problem::seen;
 
     #[test]
     fn points_belong_to_what_their_beams_meet_first() {

@@ -1,5 +1,6 @@
-//! Places of the model's surface that beams went through, each with where its beam ended: the other
-//! way round than points look for the model (CAD to scan, METHOD.md §11), with visibility.
+//! Finds places of the model's surface that beams went through, each with the place where its beam
+//! ended. These matches go from the model to the scans (METHOD.md §11), those of points the other
+//! way; they use what the beams saw.
 
 use geometry::Vector;
 use geometry::depth::{rotate, rows, transform};
@@ -11,21 +12,26 @@ use crate::state::Hypothesis;
 
 /// Samples of a link that are asked: as many as tell a hypothesis in the search.
 const N_SAMPLES: usize = 100;
-/// A surface counts as pierced from this share of the gate on: points tell what is nearer.
-const DEEP_GATE: f64 = 0.25;
-/// It counts as pierced from no less than so many standard deviations of the scans' noise.
-const DEEP_SIGMAS: f64 = 4.0;
-/// Gates below this hold only what is on the surface already, metres.
-const MIN_GATE: f64 = 0.03;
+/// How deep a beam must have gone through a surface for it to count as pierced.
+struct PiercedDepth {
+    /// In gates: points tell what is nearer.
+    gates: f64,
+    /// No less than so many standard deviations of the scans' noise.
+    sigmas: f64,
+    /// Gates below this hold only what is on the surface already, metres.
+    least_gate: f64,
+}
+
+const DEEP: PiercedDepth = PiercedDepth { gates: 0.25, sigmas: 4.0, least_gate: 0.03 };
 
 /// Surface that stands before what a beam measured, by less than the gate: it has to give way
 /// along the beam.
 pub(crate) fn pierced(problem: &Problem<'_>, h: &Hypothesis, gate: f64) -> Vec<Match> {
     let mut out = Vec::new();
-    if gate < MIN_GATE {
+    if gate < DEEP.least_gate {
         return out;
     }
-    let tolerance = (DEEP_GATE * gate).max(DEEP_SIGMAS * problem.scene.noise) as f32;
+    let tolerance = (DEEP.gates * gate).max(DEEP.sigmas * problem.scene.noise) as f32;
     let base_from_local = h.local_from_base.inverse();
     for (link, pose) in problem.prepared.local_from_links(h).iter().enumerate() {
         let to_local = rows(pose);
@@ -73,7 +79,7 @@ fn farthest(
 mod tests {
     use super::pierced as pierced_at;
     use super::*;
-    use crate::{Prepared, Scene, Settings};
+    use crate::{MeasuredScene, Prepared, Settings};
     use contract::{MaskId, OneByOne, Region, ScanId, View};
     use geometry::depth::Empty;
     use geometry::{Aabb, DepthImage, Point, Pose};
@@ -101,7 +107,7 @@ mod tests {
         let prepared = Prepared::new(0, &model, &OneByOne);
         let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
         let (views, settings) = ([wall()], Settings::default());
-        let scene = Scene::new(&region, &views, &[], &settings, &OneByOne);
+        let scene = MeasuredScene::new(&region, &views, &[], &settings, &OneByOne);
         let problem = Problem::new(&prepared, &scene, &settings, &OneByOne);
         let pierced = |front: f64, gate: f64| {
             let local_from_base = Pose::translation(0.0, 0.0, front + 0.1);

@@ -1,20 +1,22 @@
-//! The links of a posture where they stand, and for any point the nearest facet of them.
+//! The links of a posture where they stand, and the facet of them that is nearest to a point.
 //!
-//! Most of the time goes by waiting for memory: places are looked up together.
+//! Most of the time is spent waiting for memory, so several places are looked up together.
 
 use geometry::NearestField;
 use geometry::depth::{LANES, Lanes, Rows, lanes, transform, transform_lanes};
 
-use super::FINE_REACH;
 use crate::model::Fields;
 use crate::state::Hypothesis;
-use crate::{Prepared, Scene};
+use crate::{MeasuredScene, Prepared};
+
+/// Distance from which the coarse field answers, metres: just inside the fine field's reach.
+pub(super) const FINE_REACH: f64 = 0.026;
 
 /// A facet of a link next to a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NearFacet {
     pub(crate) link: usize,
-    /// Its number among the link's.
+    /// Index among the facets of the link.
     pub(crate) facet: usize,
     /// Metres.
     pub(crate) distance: f64,
@@ -29,20 +31,16 @@ pub(crate) struct Placed<'a> {
 struct PlacedLink<'a> {
     link: usize,
     fields: &'a Fields,
-    /// That of its fields which serves the gate.
+    /// The one of its fields whose reach covers the gate.
     field: &'a NearestField,
     link_from_local: Rows,
-    /// In voxels of the field, and how many it has on each axis.
+    /// Takes local coordinates to voxels of the field; `size` is how many it has on each axis.
     voxel_from_local: Rows,
     size: [f32; 3],
 }
 
 impl<'a> PlacedLink<'a> {
-    fn new(
-        prepared: &'a Prepared<'_>,
-        (link, link_from_local): (usize, Rows),
-        is_fine: bool,
-    ) -> Self {
+    fn new(prepared: &'a Prepared<'_>, link: usize, link_from_local: Rows, is_fine: bool) -> Self {
         let fields = &prepared.links[link].fields;
         let field = if is_fine { &fields.fine } else { &fields.coarse };
         let (origin, inverse_edge) = field.grid();
@@ -84,7 +82,9 @@ impl<'a> Placed<'a> {
         chosen: impl Fn(usize) -> bool,
     ) -> Self {
         let frames = prepared.frames(h).into_iter().filter(|(link, _)| chosen(*link));
-        let stand = |own: (usize, Rows)| PlacedLink::new(prepared, own, gate < FINE_REACH);
+        let stand = |(link, from_local): (usize, Rows)| {
+            PlacedLink::new(prepared, link, from_local, gate < FINE_REACH)
+        };
         Self { links: frames.map(stand).collect() }
     }
 
@@ -143,7 +143,7 @@ impl<'a> Placed<'a> {
     /// Points of a scene, each with its place and what is nearest to it.
     pub(crate) fn nearest_each(
         &self,
-        scene: &Scene<'_>,
+        scene: &MeasuredScene<'_>,
         points: &[u32],
         mut take: impl FnMut(u32, [f32; 3], Option<NearFacet>),
     ) {
@@ -163,7 +163,7 @@ impl<'a> Placed<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cubes::before_front;
+    use crate::problem::before_front;
 
     #[test]
     fn points_looked_up_together_have_the_nearest_facet_of_all() {

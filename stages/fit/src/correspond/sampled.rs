@@ -4,10 +4,22 @@ use super::pairs::MetTriangle;
 
 /// Chunks that points are summed up in: each has sums of its own for hundreds of patches, all of
 /// which are joined in the end; more of them end on all threads together.
-const N_CHUNKS: usize = 8;
-/// Least and most points of a chunk.
-const MIN_CHUNK: usize = 1024;
-const MAX_CHUNK: usize = 16_384;
+struct Chunks {
+    n: usize,
+    /// Least points of a chunk.
+    least: usize,
+    /// Most points of a chunk.
+    most: usize,
+}
+
+const CHUNKS: Chunks = Chunks { n: 8, least: 1024, most: 16_384 };
+
+/// Points that one thread works on at a time, of `n`: few enough that threads end together, as many
+/// as make what is joined after them worth it. Sums are taken chunk by chunk, so it does not depend
+/// on the threads.
+pub(crate) fn chunk(n: usize) -> usize {
+    (n / 16).clamp(1024, 8192)
+}
 
 /// Points of a scene, with the triangles that their beams met last.
 #[derive(Debug, Clone)]
@@ -23,7 +35,7 @@ impl AdjustPoints {
         Self { known: vec![None; points.len()], points, gate }
     }
 
-    /// One of so many.
+    /// One point of each `step`.
     pub(crate) fn every(&self, step: usize) -> Self {
         let points = self.points.iter().copied().step_by(step).collect();
         let known = self.known.iter().copied().step_by(step).collect();
@@ -35,12 +47,12 @@ impl AdjustPoints {
         self.every((self.points.len() / n.max(1)).max(1))
     }
 
-    /// Their indices in the scene.
+    /// Indices of the points in the scene.
     pub(crate) fn points(&self) -> &[u32] {
         &self.points
     }
 
-    /// Those that are to be kept.
+    /// The points that are to be kept.
     pub(crate) fn kept(&self, is_kept: &[bool]) -> Self {
         let all = self.points.iter().zip(&self.known).zip(is_kept);
         let (points, known) = all.filter(|(_, is_kept)| **is_kept).map(|(pair, _)| pair).unzip();
@@ -62,7 +74,8 @@ impl AdjustPoints {
         }
     }
 
-    /// Those whose beams met other links than these, and the rest, nothing of it known.
+    /// The points whose beams met other links than these, and the rest, of whose beams nothing is
+    /// known any more.
     pub(crate) fn parted(&self, links: &[usize]) -> [Self; 2] {
         let rests = |k: &Option<MetTriangle>| k.is_some_and(|k| !links.contains(&k.link()));
         let pairs = self.points.iter().copied().zip(self.known.iter().copied());
@@ -74,7 +87,7 @@ impl AdjustPoints {
 
     /// Points that one thread works on at a time, and what is known of them.
     pub(crate) fn chunks(&mut self) -> Vec<(&[u32], &mut [Option<MetTriangle>])> {
-        let n = self.points.len().div_ceil(N_CHUNKS).clamp(MIN_CHUNK, MAX_CHUNK);
+        let n = self.points.len().div_ceil(CHUNKS.n).clamp(CHUNKS.least, CHUNKS.most);
         self.points.chunks(n).zip(self.known.chunks_mut(n)).collect()
     }
 }

@@ -1,12 +1,12 @@
-//! Points near a robot as it stands, picked link by link: the large links must not outvote the
-//! wrist (METHOD.md §11.7).
+//! Picks points near a robot link by link, so that large links do not outvote the wrist (METHOD.md
+//! §11.7).
 
 use geometry::Aabb;
 use geometry::depth::{Rows, transform};
 use std::borrow::Cow;
 
-use super::placed::{NearFacet, Placed};
-use super::{AdjustPoints, FINE_REACH, chunk};
+use super::placed::{FINE_REACH, NearFacet, Placed};
+use super::sampled::{AdjustPoints, chunk};
 use crate::problem::Problem;
 use crate::state::Hypothesis;
 
@@ -75,7 +75,7 @@ pub(crate) fn adjusted_points(problem: &Problem<'_>, h: &Hypothesis, n: usize) -
 
 /// Least points of a link that are taken, if it has as many.
 const MIN_CAP: usize = 2000;
-/// So many times the points wanted are looked at, at most: a small link has a twentieth of all.
+/// Most points that are looked at for each that is wanted: a small link has a twentieth of all.
 const LOOKED_AT: usize = 10;
 
 /// About `n` of the points at most, thinned evenly.
@@ -97,10 +97,15 @@ struct AdjustGate {
 }
 
 const ADJUST_GATE: AdjustGate = AdjustGate { sigmas: 3.0, least: 0.02, most: 0.03 };
-/// Room about a link within which points count as beside the robot: in gates, of which the least is
-/// given in metres.
-const BESIDE_GATES: f64 = 1.7;
-const LEAST_BESIDE_GATE: f64 = 0.05;
+
+/// Room about a link within which points count as beside the robot.
+struct BesideRoom {
+    gates: f64,
+    /// Least gate, metres.
+    least_gate: f64,
+}
+
+const BESIDE: BesideRoom = BesideRoom { gates: 1.7, least_gate: 0.05 };
 
 /// Links of a robot as it stands, with what lies about it: points are sorted by them.
 struct Strata<'a> {
@@ -113,7 +118,7 @@ struct Strata<'a> {
 
 impl<'a> Strata<'a> {
     fn new(problem: &'a Problem<'a>, h: &Hypothesis, gate: f64) -> Self {
-        let room = gate.max(LEAST_BESIDE_GATE) * BESIDE_GATES;
+        let room = gate.max(BESIDE.least_gate) * BESIDE.gates;
         let links = problem.prepared.frames(h).into_iter();
         let about =
             links.map(|(l, frame)| (frame, problem.prepared.model.links[l].bounds.grown(room)));

@@ -1,5 +1,5 @@
-//! The face of a bare flange, and which points lie in front of it. What a robot holds hangs there
-//! and nowhere else: points in front of the face say nothing of the arm, points beside the wrist
+//! The face of a bare flange, and which points lie in front of it. A robot holds things there and
+//! nowhere else: points in front of the face say nothing of the arm, while points beside the wrist
 //! speak against a posture.
 
 use geometry::Point;

@@ -1,5 +1,5 @@
 //! Samples of a link's surface, ordered so that neighbours in space are neighbours in memory, and
-//! for any place near the surface the nearest of them.
+//! the nearest of them to any place near the surface.
 
 use geometry::{NearestField, Vector};
 use robot::{CadCloud, Link};
@@ -33,11 +33,11 @@ const NEAR: f32 = 0.016;
 
 /// A sample of a surface, link frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Facet {
+pub struct Facet {
     /// Metres.
-    pub(crate) x: [f32; 3],
-    /// Outward, unit length.
-    pub(crate) n: [f32; 3],
+    pub x: [f32; 3],
+    /// Outward normal, unit length.
+    pub n: [f32; 3],
 }
 
 /// Samples of a link's surface, and which of them is nearest to a place.
@@ -77,7 +77,7 @@ impl Fields {
         Self { facets, patches, keys, coarse, fine, triangles: OnceLock::new() }
     }
 
-    /// For each patch the side that it looks to.
+    /// The side that each patch looks to.
     pub(crate) fn sides(&self) -> impl Iterator<Item = u8> {
         self.keys.iter().map(|key| key.0)
     }

@@ -14,7 +14,8 @@ use robot::Model;
 use std::sync::Arc;
 
 pub(crate) use face::Face;
-pub(crate) use facets::{Facet, Fields};
+pub use facets::Facet;
+pub(crate) use facets::Fields;
 #[cfg(test)]
 pub(crate) use patches::HALF_PATCH;
 pub(crate) use patches::{
@@ -33,9 +34,9 @@ pub struct Prepared<'a> {
     pub index: usize,
     pub(crate) links: Arc<Vec<PreparedLink>>,
     /// For each free joint: the links that get their pose when it is set, later ones not yet.
-    pub(crate) placed_by: Vec<Vec<usize>>,
+    pub placed_by: Vec<Vec<usize>>,
     /// Links with a surface that no free joint moves.
-    pub(crate) fixed: Vec<usize>,
+    pub fixed: Vec<usize>,
     /// No part of the robot gets farther from the base's origin, metres.
     pub(crate) reach: f64,
     /// For each free joint: distance of the samples it places from its axis, 95th percentile,
@@ -78,12 +79,12 @@ impl<'a> Prepared<'a> {
         Self::of(index, model, fields.into_iter())
     }
 
-    /// Prepares a model whose links are those of others, one after the other (an arm, and a tool on
-    /// it), from what is known of them.
+    /// Prepares model `index`, whose links are those of others, one after the other (an arm, and a
+    /// tool on it), from what is known of them.
     #[must_use]
-    pub fn joined(parts: &[&Prepared<'_>], whole: (usize, &'a Model)) -> Self {
+    pub fn joined(parts: &[&Prepared<'_>], index: usize, model: &'a Model) -> Self {
         let links = parts.iter().flat_map(|part| part.links.iter());
-        Self::of(whole.0, whole.1, links.map(|l| Arc::clone(&l.fields)))
+        Self::of(index, model, links.map(|l| Arc::clone(&l.fields)))
     }
 
     fn of(index: usize, model: &'a Model, fields: impl Iterator<Item = Arc<Fields>>) -> Self {
@@ -141,7 +142,7 @@ impl<'a> Prepared<'a> {
         });
     }
 
-    /// The same for a model that differs in where its joints are, not in its links.
+    /// What is prepared for this model, for one with the same links and other places of joints.
     pub(crate) fn moved<'b>(&self, model: &'b Model) -> Prepared<'b> {
         Prepared {
             model,
@@ -188,8 +189,31 @@ impl<'a> Prepared<'a> {
             .collect()
     }
 
-    /// The first `n` samples and normals of a link.
-    pub(crate) fn samples(&self, link: usize, n: usize) -> (&[[f32; 3]], &[[f32; 3]]) {
+    /// Whether a link has a surface.
+    #[must_use]
+    pub fn has_surface(&self, link: usize) -> bool {
+        self.links[link].weight > 0.0
+    }
+
+    /// The facet of a link that is nearest to a place (link frame, metres), up to about 3 cm away.
+    #[must_use]
+    pub fn facet_near(&self, link: usize, place: [f32; 3]) -> Option<&Facet> {
+        let fields = &self.links[link].fields;
+        fields.fine.nearest(place).map(|at| &fields.facets[at])
+    }
+
+    /// The facet nearest to a place, up to 15 cm away; farther than about 3 cm it is the nearest of
+    /// a few samples.
+    #[must_use]
+    pub fn facet_about(&self, link: usize, place: [f32; 3]) -> Option<&Facet> {
+        let fields = &self.links[link].fields;
+        let at = fields.fine.nearest(place).or_else(|| fields.coarse.nearest(place))?;
+        Some(&fields.facets[at])
+    }
+
+    /// The first `n` samples of a link and their normals, link frame, metres.
+    #[must_use]
+    pub fn samples(&self, link: usize, n: usize) -> (&[[f32; 3]], &[[f32; 3]]) {
         let cad = &self.model.links[link].cad;
         let n = n.min(cad.points.len());
         (&cad.points[..n], &cad.normals[..n])

@@ -32,7 +32,7 @@ impl Patches {
         self.groups.len()
     }
 
-    /// Those of each link.
+    /// The patches of each link.
     pub(crate) fn links(&self) -> impl Iterator<Item = Range<usize>> {
         let mut end = 0;
         self.groups.chunk_by(|a, b| a / N_SIDES == b / N_SIDES).map(move |link| {
@@ -51,19 +51,25 @@ pub(crate) enum Smoothness {
     Field(Kernel),
 }
 
-/// Of the ways in which a patch may be off those that follow a field: its offset and tilts.
+/// Number of the ways in which a patch may be off that follow a field: its offset and tilts.
 pub(crate) const N_SMOOTH: usize = 3;
-/// Nodes of the field are this near to each patch, in lengths, …
-const NODE_GAP: f64 = 0.8;
-/// … but no more than so many on a link.
-const MAX_NODES: usize = 64;
+
+/// Nodes of the field over a link.
+struct FieldNodes {
+    /// They are this near to each patch, in lengths, …
+    gap: f64,
+    /// … but no more than so many.
+    most: usize,
+}
+
+const NODES: FieldNodes = FieldNodes { gap: 0.8, most: 64 };
 /// Added to the nodes' correlation with themselves, for rounding.
 const JITTER: f64 = 1e-6;
 
 /// Where a patch lies, link frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PatchPlace {
-    /// Its middle, metres.
+    /// Middle of the patch, metres.
     pub(crate) x: Vector,
     /// Mean of its normals: shorter than one where it is bent.
     pub(crate) n: Vector,
@@ -155,9 +161,9 @@ impl Kernel {
         let mut away = vec![f64::INFINITY; places.len()];
         let mut nodes: Vec<&PatchPlace> = Vec::new();
         let mut next = 0;
-        while nodes.len() < MAX_NODES {
+        while nodes.len() < NODES.most {
             nodes.push(&places[next]);
-            let mut farthest = NODE_GAP * NODE_GAP;
+            let mut farthest = NODES.gap * NODES.gap;
             let before = nodes.len();
             for (i, (away, place)) in away.iter_mut().zip(places).enumerate() {
                 *away = away.min(self.apart2(place, nodes[before - 1]));
@@ -165,7 +171,7 @@ impl Kernel {
                     (farthest, next) = (*away, i);
                 }
             }
-            if farthest <= NODE_GAP * NODE_GAP {
+            if farthest <= NODES.gap * NODES.gap {
                 break;
             }
         }

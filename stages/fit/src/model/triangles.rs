@@ -1,8 +1,8 @@
 //! The triangles of a link's mesh in a grid, and where a beam first meets them near a place.
 //!
-//! A sample stands for all of the surface that is nearer to it than to others: at bends its plane
-//! is off by a tenth of a millimetre, and beside an edge it may be that of the other face,
-//! millimetres off. The mesh itself knows.
+//! A sample stands for all of the surface that is nearer to it than to other samples. At bends its
+//! plane is off by a tenth of a millimetre, and beside an edge it may be that of the other face,
+//! millimetres off. The mesh itself has no such error.
 
 use geometry::{Aabb, Vector};
 use nalgebra::Vector3;
@@ -10,10 +10,16 @@ use robot::Mesh;
 
 /// Least edge of a cell, metres: a few triangles of a casting.
 const CELL: f32 = 0.008;
-/// Most cells of a link, 16 MiB: larger links, and those in the wrong unit, have larger cells.
-const MAX_CELLS: f32 = 4e6;
-/// Most entries in all cells of a link, ten times those of the finest mesh.
-const MAX_ENTRIES: f32 = 2e7;
+
+/// Bounds of a link's grid: larger links, and those in the wrong unit, have larger cells.
+struct GridBounds {
+    /// Most cells: 16 MiB.
+    cells: f32,
+    /// Most entries in all cells, ten times those of the finest mesh.
+    entries: f32,
+}
+
+const MOST: GridBounds = GridBounds { cells: 4e6, entries: 2e7 };
 /// Slices of a grid overlap by this share of a cell, so that rounding loses no corner.
 const BORDER: f32 = 1e-3;
 /// Beams through the seam of two triangles meet one of them: share of a triangle's size.
@@ -149,7 +155,7 @@ impl CellGrid {
         let mut edge = CELL;
         while is_sound
             && edge < longest
-            && (cells(edge) > MAX_CELLS || n_entries(mesh, edge) > MAX_ENTRIES)
+            && (cells(edge) > MOST.cells || n_entries(mesh, edge) > MOST.entries)
         {
             edge *= 2.0;
         }

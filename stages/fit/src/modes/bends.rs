@@ -1,14 +1,13 @@
-//! Other values of joints about the end of an adjusted posture that are worth a look (METHOD.md
-//! §9): of the joint before the last, since a wrist of which little is seen has many, and what
-//! hangs on its flange draws it to some of them; and of a tool's slides, which stand as well in a
+//! Finds other values of the last joints of an adjusted posture that are worth refining (METHOD.md
+//! §9). The joint before the last has many of them where little of the wrist is seen, and what
+//! hangs on the flange draws it to some. The slides of a tool fit as well where they stand within a
 //! part that the tool holds.
 
 use std::f64::consts::TAU;
 
 use super::profile::JointProfile;
 use super::settings::{BendLimits, MODES};
-use crate::judge::judged;
-use crate::problem::Problem;
+use crate::problem::{Problem, judged};
 use crate::refine::Refined;
 use crate::state::Hypothesis;
 

@@ -1,18 +1,17 @@
-//! Closed loops that stand on the other of their two solutions, by the points and beams of their
-//! own links (METHOD.md §12): limits and closure say which solutions there are, the assembly mode
-//! of the zero posture stays where the points cannot tell.
+//! Tells which closed loops stand on the other of their two solutions, by the points and beams of
+//! their own links (METHOD.md §12). Limits and closure say which solutions there are; where the
+//! points cannot tell, the assembly mode of the zero posture stays.
 
 use robot::Model;
 
 use super::settings::MODES;
 use crate::correspond::Apart;
-use crate::judge::{Judgement, judged, moved};
-use crate::problem::Problem;
+use crate::problem::{Judgement, Problem, judged, links_apart};
 use crate::state::Hypothesis;
 
 /// A model with some of its closed loops on their other solution.
 pub(crate) struct OtherLoops {
-    /// Those loops.
+    /// The loops that stand on their other solution.
     pub(crate) loops: Vec<usize>,
     pub(crate) model: Model,
 }
@@ -36,7 +35,7 @@ pub(crate) fn other_loops(
         let before = Problem { prepared: &before, ..*problem };
         let after = Problem { prepared: &after, ..*problem };
         let found = judged(&after, h);
-        let links = moved([before.prepared, after.prepared], [h, h]);
+        let links = links_apart([before.prepared, after.prepared], [h, h]);
         let (mut ahead, mut seen) = (0.0, 0.0);
         for &l in &links {
             ahead += found.links[l][0] - best.links[l][0];

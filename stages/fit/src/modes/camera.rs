@@ -1,10 +1,10 @@
-//! How far base and joints may be off beyond what the scatter of the points says where depth
-//! cameras measured them (METHOD.md §14.2).
+//! How far base and joints may be off where depth cameras measured them, beyond what the scatter of
+//! the points says (METHOD.md §14.2).
 //!
-//! A camera has whole links off, each by an amount of its own: up to 15 mm where its neighbour is
-//! not, with hundreds of points and more on each (`scripts/camera_residuals.py`). Such errors leave
-//! no residuals, since the joints between the links follow them: they are laid on the links here,
-//! and the adjustment is asked how it would answer.
+//! A camera shifts whole links, each by an amount of its own: up to 15 mm where its neighbour is
+//! not shifted, with hundreds of points and more on each (`scripts/camera_residuals.py`). Such
+//! errors leave no residuals, since the joints between the links follow them. Here they are laid on
+//! the links, and the answer of the adjustment to them is computed.
 
 use geometry::{Point, Vector, robust};
 use nalgebra::{DMatrix, DVector};

@@ -2,14 +2,13 @@
 //! (METHOD.md §9).
 //!
 //! A small wrist turned by half a turn about both of its axes differs in a bolt or two, which beams
-//! alone do not tell; and a wrist among the points of what hangs on it is drawn to them, which
-//! beams do tell.
+//! alone do not tell. A wrist among the points of what hangs on it is drawn to them, which beams do
+//! tell.
 
-use super::Settled;
 use super::settings::{MODES, RivalLimits};
+use super::settled::Settled;
 use crate::correspond::worsening;
-use crate::judge::{Judgement, margin, moved};
-use crate::problem::{Problem, SweepSteps};
+use crate::problem::{JudgedPosture, Judgement, Problem, SweepSteps, links_apart, margin};
 use crate::refine::Refined;
 use crate::state::Hypothesis;
 
@@ -24,8 +23,9 @@ pub(crate) fn lead(
     judgement: &Judgement,
     other: &Refined,
 ) -> [f64; 2] {
-    let by_beams =
-        margin(problem.prepared, (best, judgement), (&other.hypothesis, &other.judgement));
+    let own = JudgedPosture { hypothesis: best, judgement };
+    let rival = JudgedPosture { hypothesis: &other.hypothesis, judgement: &other.judgement };
+    let by_beams = margin(problem.prepared, own, rival);
     let by_points = match is_slid(problem, best, &other.hypothesis) {
         true => 0.0,
         false => worsening(problem, best, &other.hypothesis),
@@ -57,7 +57,7 @@ pub(crate) fn closes_tool(problem: &Problem<'_>, joint: usize) -> bool {
 pub(crate) fn is_on_its_way(problem: &Problem<'_>, h: &Hypothesis, other: &Hypothesis) -> bool {
     let prepared = problem.prepared;
     (0..h.posture.len()).any(|j| !prepared.leaf[j] && h.turn(other, j) > MODES.other_turn)
-        && moved([prepared; 2], [h, other]).is_empty()
+        && links_apart([prepared; 2], [h, other]).is_empty()
 }
 
 /// Postures that explain nearly as much and that beams and points together hardly like less, best
@@ -93,7 +93,7 @@ pub(crate) fn close_rivals(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cubes::with_jaw;
+    use crate::problem::with_jaw;
 
     #[test]
     fn only_a_jaw_that_slid_is_told_by_beams_alone() {

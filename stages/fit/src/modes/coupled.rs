@@ -1,17 +1,17 @@
-//! How far joints give way to leaf joints after them that may stand at several values (METHOD.md
+//! How far joints yield to leaf joints after them that may stand at several values (METHOD.md
 //! §14.2, *sway*).
 
 use contract::OneByOne;
+use geometry::angle;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
-use super::JointModes;
 use super::settings::MODES;
+use super::settled::JointModes;
 use crate::adjust::{Adjust, Adjusted, Normal};
 use crate::correspond::{AdjustPoints, worsening};
 use crate::problem::Problem;
 use crate::state::Hypothesis;
-use crate::turns;
 
 /// Covariance of the joints that comes from those that may stand at several values, radians² or
 /// metres²: a flange's bolts pull at the wrist, and which way they pull is as open as the flange.
@@ -47,7 +47,7 @@ pub(crate) fn coupled_spread(
         }
         modes.push(end);
         let change = |j: usize, _| match is_swayed[j] {
-            true => turns::from_to(own.posture[j], end.posture[j]),
+            true => angle::from_to(own.posture[j], end.posture[j]),
             false => 0.0,
         };
         let away = DVector::from_fn(n, change);
@@ -109,7 +109,7 @@ fn turned(problem: &Problem<'_>, h: &Hypothesis, several: &[&JointModes]) -> Vec
                 h.posture[s.joint] + TAU * k as f64 / (MODES.coupled.n_around + 1) as f64
             };
             let limits = problem.prepared.model.limits(s.joint);
-            (1..=MODES.coupled.n_around).filter_map(move |k| turns::within(by(k), limits))
+            (1..=MODES.coupled.n_around).filter_map(move |k| angle::within(by(k), limits))
         });
         let joint = s.joint;
         let all = listed.chain(around.into_iter().flatten());

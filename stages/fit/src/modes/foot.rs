@@ -1,6 +1,6 @@
-//! How far the base may turn under the robot, the first joint turned back, before the points of the
-//! foot contradict it: a round foot of which little is seen may stand at any yaw, and its valley of
-//! squares has no slope to tell the covariance so (METHOD.md §14.2).
+//! How far the base may turn under the robot, with the first joint turned back, before the points
+//! of the foot contradict it (METHOD.md §14.2). A round foot of which little is seen may stand at
+//! any yaw, and its valley of squares is too flat for the covariance to show that.
 
 use geometry::{Pose, Vector};
 use nalgebra::{DMatrix, DVector, Unit, UnitQuaternion};

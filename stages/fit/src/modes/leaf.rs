@@ -2,14 +2,14 @@
 //! with six bolts looks the same every 60°, and only points on its small features tell (METHOD.md
 //! §9).
 
+use geometry::angle;
 use std::f64::consts::TAU;
 
-use super::JointModes;
 use super::profile::JointProfile;
 use super::settings::MODES;
+use super::settled::JointModes;
 use crate::problem::Problem;
 use crate::state::Hypothesis;
-use crate::turns;
 
 /// How far the run of values around `own` reaches, up or down, whose costs are within the limit; it
 /// may begin a little beside `own`, to which all points drew it, not those of the profile alone.
@@ -65,9 +65,9 @@ fn modes_of(problem: &Problem<'_>, h: &Hypothesis, joint: usize) -> Option<Joint
     good.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut values: Vec<f64> = Vec::new();
     for (value, _) in good {
-        if values.iter().all(|v| turns::apart(*v, value) > MODES.same_turn) {
+        if values.iter().all(|v| angle::apart(*v, value) > MODES.same_turn) {
             // A little beyond a stop that it cannot be turned back from it stays there.
-            values.push(turns::within(value, [low, high]).unwrap_or(value));
+            values.push(angle::within(value, [low, high]).unwrap_or(value));
         }
     }
     Some(JointModes { joint, values, extent })

@@ -2,8 +2,8 @@
 //! adjusted to (METHOD.md §14.2, *profile*).
 //!
 //! The covariance takes the sum of squares for a parabola. Where a wrist shows two hundred points,
-//! most of them beside edges, it is none: which of them lie on the model at all changes as it
-//! bends, and another value may be as good or better.
+//! most of them beside edges, the sum is no parabola: which points lie on the model changes as the
+//! wrist bends, and another value may fit as well or better.
 
 use super::settings::{MODES, MarginalLimits};
 use crate::adjust::{Adjust, Adjusted};
@@ -24,7 +24,7 @@ pub(crate) fn marginal_spread(
     let sigma = |j: usize| best.covariance[(6 + j, 6 + j)].max(0.0).sqrt();
     let is_asked = |j: usize| !problem.prepared.leaf[j] && LIMITS.sigma.contains(sigma(j));
     let of = |j: usize| match is_asked(j)
-        .then(|| costs(problem, best, points, &Asked { joint: j, sigma: sigma(j) }))
+        .then(|| costs(problem, best, points, &JointSigma { joint: j, sigma: sigma(j) }))
     {
         Some(Some(costs)) => (mean_square(&costs) - 1.0).max(0.0) * sigma(j).powi(2),
         _ => 0.0,
@@ -33,7 +33,7 @@ pub(crate) fn marginal_spread(
 }
 
 /// A joint and its standard deviation as the covariance states it.
-struct Asked {
+struct JointSigma {
     joint: usize,
     /// Radians or metres.
     sigma: f64,
@@ -44,7 +44,7 @@ fn costs(
     problem: &Problem<'_>,
     best: &Adjusted,
     points: &AdjustPoints,
-    &Asked { joint, sigma }: &Asked,
+    &JointSigma { joint, sigma }: &JointSigma,
 ) -> Option<Vec<f64>> {
     let [_, turning] = points.parted(&problem.prepared.carried(joint));
     if turning.points().len() > LIMITS.max_points {

@@ -23,6 +23,7 @@ mod leaf;
 mod marginal;
 mod profile;
 mod settings;
+mod settled;
 mod trade_off;
 mod wrist;
 
@@ -36,65 +37,15 @@ pub(crate) use leaf::leaf_modes;
 pub(crate) use marginal::marginal_spread;
 pub(crate) use profile::JointProfile;
 pub(crate) use settings::{AsGood, MODES};
+pub(crate) use settled::{JointModes, Settled, better_leaves};
 pub(crate) use trade_off::trade_off;
 pub(crate) use wrist::{OtherEnd, WristModes, gain};
 
-use crate::adjust::Adjusted;
 use crate::correspond::AdjustPoints;
-use crate::judge::Judgement;
 use crate::refine::Refined;
-use crate::turns;
 
-/// Values of one joint.
-#[derive(Debug, Clone)]
-pub(crate) struct JointModes {
-    pub(crate) joint: usize,
-    /// All values at which the points fit as well as at the best one, best first.
-    pub(crate) values: Vec<f64>,
-    /// How far around the posture's own value all values are as good, at most, radians: 0 where
-    /// those beside it are worse.
-    pub(crate) extent: f64,
-}
-
-impl JointModes {
-    /// Whether the joint may stand at several values.
-    pub(crate) fn is_several(&self) -> bool {
-        self.values.len() > 1
-    }
-}
-
-/// A posture with the best values of its leaf joints, where one of them is another mode, not the
-/// same one found again.
-pub(crate) fn better_leaves(posture: &[f64], leaves: &[JointModes]) -> Option<Vec<f64>> {
-    let mut out = posture.to_vec();
-    leaves.iter().for_each(|s| out[s.joint] = s.values[0]);
-    let is_other = |s: &JointModes| turns::apart(posture[s.joint], out[s.joint]) > MODES.same_turn;
-    leaves.iter().any(is_other).then_some(out)
-}
-
-/// A posture adjusted, with the values that the points leave to its leaf joints.
-#[derive(Debug, Clone)]
-pub(crate) struct Settled {
-    pub(crate) adjusted: Adjusted,
-    pub(crate) judgement: Judgement,
-    pub(crate) leaves: Vec<JointModes>,
-}
-
-impl Settled {
-    /// Where it stands, without what the adjustment knows of it.
-    pub(crate) fn refined(&self) -> Refined {
-        let (hypothesis, judgement) = (self.adjusted.hypothesis.clone(), self.judgement.clone());
-        Refined { hypothesis, judgement }
-    }
-
-    /// Leaf joints that may stand at several values.
-    pub(crate) fn open_leaves(&self) -> Vec<usize> {
-        self.leaves.iter().filter(|s| s.is_several()).map(|s| s.joint).collect()
-    }
-}
-
-/// The answer and all that explains the points about as well: what a report is made of.
-pub(crate) struct Answer {
+/// The best posture and all that explains the points about as well: what a report is made of.
+pub(crate) struct PostureModes {
     pub(crate) best: Settled,
     /// The points of its adjustment, with what their beams met.
     pub(crate) points: AdjustPoints,

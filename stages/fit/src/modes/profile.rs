@@ -1,5 +1,5 @@
-//! The profile of one joint: how far the points near the links that it moves are from the arm,
-//! value by value, all else as it stands (METHOD.md §9).
+//! The profile of one joint: the distances from the arm of the points near the links that the joint
+//! moves, at each of its values, with all else as it stands (METHOD.md §9).
 
 use super::settings::MODES;
 use crate::correspond::{MIN_POINTS, distances, squares, swept};

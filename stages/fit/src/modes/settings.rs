@@ -1,4 +1,4 @@
-//! The settings of all questions about other postures, each with unit and reason.
+//! Settings of all comparisons with other postures, with units and reasons.
 
 use crate::correspond::CAP;
 

@@ -1,5 +1,5 @@
-//! Which unknowns of a fit trade off against one another, in words, by its covariance (METHOD.md
-//! §14.3).
+//! States in words which unknowns of a fit trade off against one another, by its covariance
+//! (METHOD.md §14.3).
 
 use contract::Fit;
 use nalgebra::DMatrix;

@@ -1,20 +1,19 @@
-//! Other bends of the joint before an open flange, each at the turn of the flange that suits it
-//! best, and how well the points fit there (METHOD.md §9).
+//! Finds other bends of the joint before an open flange, each at the turn of the flange that suits
+//! it best, and how well the points fit there (METHOD.md §9).
 //!
-//! A flange turned to where it is not pulls the wrist with it, by degrees where a hundred points
-//! lie on both: neither joint alone finds back, and the valley there is as narrow as the right
-//! one's.
+//! A flange that is turned wrongly pulls the wrist with it, by degrees where a hundred points lie
+//! on both. Neither joint alone finds the way back, and the valley there is as narrow as that of
+//! the right turn.
 
-use geometry::Point;
+use geometry::{Point, angle};
 use std::f64::consts::TAU;
 
-use super::JointModes;
 use super::settings::{MODES, WristLimits};
+use super::settled::JointModes;
 use crate::adjust::{Adjust, Adjusted};
 use crate::correspond::{AdjustPoints, spheres};
 use crate::problem::{AdjustState, Problem};
 use crate::state::Hypothesis;
-use crate::turns;
 
 const LIMITS: WristLimits = MODES.wrist;
 
@@ -163,14 +162,14 @@ fn turns(problem: &Problem<'_>, h: &Hypothesis, flange: usize) -> Vec<f64> {
     let n = TAU * problem.prepared.lever[flange] / LIMITS.turn_step;
     let n = n.ceil().clamp(LIMITS.least_turns, LIMITS.most_turns);
     let (own, limits) = (h.posture[flange], problem.prepared.model.limits(flange));
-    let others = (1..n as usize).filter_map(|k| turns::within(own + TAU * k as f64 / n, limits));
+    let others = (1..n as usize).filter_map(|k| angle::within(own + TAU * k as f64 / n, limits));
     std::iter::once(own).chain(others).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cubes::before_plate;
+    use crate::problem::before_plate;
 
     /// What is asked of a plate's wrist where it is looked at as bent and turned by so much.
     fn of(posture: [f64; 2], look: impl Fn(&WristModes, &Hypothesis)) {

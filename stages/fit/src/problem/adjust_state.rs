@@ -1,7 +1,7 @@
-//! Where an adjustment stands: base, joints, the errors of the scans, and what is known of noise
+//! The state of an adjustment: base, joints, the errors of the scans, and the estimates of noise
 //! and shape so far.
 
-use crate::Scene;
+use crate::MeasuredScene;
 use crate::model::Smoothness;
 use crate::state::{Hypothesis, ScanError};
 
@@ -22,14 +22,14 @@ pub(crate) struct AdjustState {
 impl AdjustState {
     /// A posture, before anything is known of the scans' errors. Offsets of patches are taken as
     /// independent: that is fast to solve, and enough to choose by.
-    pub(crate) fn at(hypothesis: &Hypothesis, scene: &Scene<'_>) -> Self {
+    pub(crate) fn at(hypothesis: &Hypothesis, scene: &MeasuredScene<'_>) -> Self {
         let scans = vec![ScanError::NONE; scene.views.len()];
         let hypothesis = hypothesis.clone();
         let smoothness = Some(Smoothness::Apart);
         Self { hypothesis, scans, noise: scene.noise, patch_sigma: 0.0, smoothness }
     }
 
-    /// The same, with the smoothness of the surface's offsets to be estimated.
+    /// The state with the smoothness of the surface's offsets to be estimated.
     pub(crate) fn with_open_smoothness(self) -> Self {
         Self { smoothness: None, ..self }
     }

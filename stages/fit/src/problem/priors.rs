@@ -1,12 +1,12 @@
-//! What is known before any point is looked at: the plane that the base stands on, joint limits,
-//! and how well scans are registered (METHOD.md §5, §11.5).
+//! Adds what is known before any point is looked at to normal equations: the plane that the base
+//! stands on, joint limits, and how well scans are registered (METHOD.md §5, §11.5).
 
-use contract::Candidate;
-use geometry::{Pose, Vector};
-use nalgebra::{DMatrix, DVector, Translation3};
+use geometry::Vector;
+use nalgebra::{DMatrix, DVector};
 use robot::JointKind;
 
-use super::Problem;
+use super::base_prior::Prior;
+use super::context::Problem;
 use crate::state::{Hypothesis, N_SCAN};
 use crate::{Prepared, Settings};
 
@@ -19,29 +19,6 @@ const LIMIT_SIGMA: f64 = 0.0087;
 const OFF_PLANE_SIGMAS: f64 = 3.0;
 /// How far a sliding joint may stand beyond its limits, metres: what models and stops may be off.
 const SLIDE_PLAY: f64 = 0.004;
-
-/// The base stands upright on a plane.
-#[derive(Clone, Copy)]
-pub(crate) struct Prior {
-    /// Frame on the plane, z = normal, local frame.
-    pub(crate) local_from_plane: Pose,
-    /// Standard deviations of height, metres, and tilt, radians.
-    pub(crate) sigma: [f64; 2],
-}
-
-impl Prior {
-    /// The installation plane of a candidate, at the height of the base's origin.
-    pub(crate) fn of(candidate: &Candidate, local_from_world: &Pose, settings: &Settings) -> Self {
-        // The candidate's bases already stand on the plane: the first one tells the height of the
-        // origin above it.
-        let base = candidate.bases.first().map_or_else(Pose::identity, |b| local_from_world * b.0);
-        let (at, turn) =
-            (Translation3::from(base.translation.vector), candidate.plane.plane.frame());
-        let is_guess = candidate.plane.is_guess();
-        let sigma = if is_guess { settings.guess_sigma } else { settings.plane_sigma };
-        Self { local_from_plane: Pose::from_parts(at, turn), sigma }
-    }
-}
 
 /// Adds joint limits, the installation plane, and a weak pull to stay where the points say nothing
 /// to normal equations of base twist (base axes) and joints.

@@ -1,9 +1,9 @@
-//! The steps in which a search sweeps joints: the measure in which two postures are near each
-//! other.
+//! The steps in which a search sweeps joints. They are also the measure of how near two postures
+//! are to each other.
 
 use std::f64::consts::TAU;
 
-use super::Problem;
+use super::context::Problem;
 use crate::state::Hypothesis;
 use crate::{Prepared, Settings};
 
@@ -48,7 +48,7 @@ impl<'a> SweepSteps<'a> {
         Self { prepared: problem.prepared, settings: problem.settings, tolerance }
     }
 
-    /// The same for another tolerance, metres.
+    /// The steps for another tolerance, metres.
     pub(crate) fn with_tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }
     }

@@ -1,11 +1,12 @@
 //! Gauss–Newton over base and all joints on point-to-plane residuals (METHOD.md §11.1).
 //!
-//! Sums run in the order of the points: the same bits on any machine with IEEE arithmetic.
+//! Sums run in the order of the points, which gives the same bits on any machine with IEEE
+//! arithmetic.
 
 use geometry::robust;
 use nalgebra::{DMatrix, DVector};
 
-use super::Round;
+use super::rounds::Round;
 use crate::correspond::{Matching, chunk, pierced};
 use crate::problem::{Problem, add_priors, keep_slides, residual_row};
 use crate::state::Hypothesis;

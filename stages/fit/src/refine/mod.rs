@@ -1,20 +1,21 @@
-//! Second phase: hypotheses of a search become [`Refined`] postures. Base and all joints move to
-//! the least robust point-to-plane error on thinned points, and beams judge where they end
-//! (METHOD.md §11.1).
+//! Second phase: refines hypotheses of a search ([`Refined`]). Base and all joints move to the
+//! least robust point-to-plane error on thinned points, and beams judge where they end (METHOD.md
+//! §11.1).
 //!
-//! In the rounds with wide gates surface that beams went through gives way along them, too
+//! In the rounds with wide gates, surface that beams went through is moved along these beams, too
 //! (`correspond/pierced.rs`).
 
 mod gauss_newton;
+mod rounds;
 
 pub(crate) use gauss_newton::add_scaled;
+pub(crate) use rounds::COARSE_ROUNDS;
 
 use crate::correspond::{PerLink, some, stratified};
-use crate::judge::{Judgement, judge, judged};
-use crate::problem::{Problem, SweepSteps};
-
+use crate::problem::{Judgement, Problem, SweepSteps, judge, judged};
 use crate::state::Hypothesis;
 use gauss_newton::{noise, run};
+use rounds::{FINE_ROUNDS, NEAR_ROUNDS, Round};
 
 /// A posture refined on thinned points, with what the beams say of it.
 #[derive(Debug, Clone)]
@@ -23,38 +24,6 @@ pub(crate) struct Refined {
     pub(crate) judgement: Judgement,
 }
 
-/// One round of the schedule.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Round {
-    /// Scale of the robust kernel and gate on the distance, metres.
-    gate: f64,
-    /// Whether each link weighs the same (square root of its points) or by its points.
-    balanced: bool,
-}
-
-/// From a posture that a search found: gates as in METHOD.md §11, ending where the fine field takes
-/// over.
-pub(crate) const COARSE_ROUNDS: [Round; 9] = [
-    Round { gate: 0.120, balanced: true },
-    Round { gate: 0.120, balanced: true },
-    Round { gate: 0.090, balanced: true },
-    Round { gate: 0.065, balanced: true },
-    Round { gate: 0.050, balanced: true },
-    Round { gate: 0.040, balanced: true },
-    Round { gate: 0.030, balanced: true },
-    Round { gate: 0.025, balanced: true },
-    Round { gate: 0.020, balanced: true },
-];
-
-/// The last of the coarse rounds: from a posture that is off by no more than a step of a sweep.
-const NEAR_ROUNDS: &[Round] = COARSE_ROUNDS.split_at(3).1;
-
-/// The rounds after those, on the fine field.
-const FINE_ROUNDS: [Round; 3] = [
-    Round { gate: 0.025, balanced: true },
-    Round { gate: 0.018, balanced: true },
-    Round { gate: 0.014, balanced: false },
-];
 /// Rounds that end at a posture, with the gate that the noise of the points asks for.
 const N_LAST_ROUNDS: usize = 4;
 

@@ -1,6 +1,7 @@
 //! Everything that was measured in a region, as fits of any model read it: what beams and points
-//! say of a place, and the points with their scans.
+//! say of a place, and the points with their views.
 
+mod measured;
 mod noise;
 
 use contract::{Fan, InstallationPlane, Region, View};
@@ -13,14 +14,7 @@ use std::sync::Arc;
 
 use crate::state::Hypothesis;
 use crate::{Prepared, Settings};
-
-/// A measured point, local frame.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Measured {
-    pub(crate) p: [f32; 3],
-    /// Index of its view.
-    pub(crate) view: u16,
-}
+use measured::Measured;
 
 /// Points of a scene that may be a robot's, as indices into its points, ascending.
 #[derive(Debug)]
@@ -35,14 +29,14 @@ const NEAR_MARGIN: f64 = 0.15;
 
 /// Everything measured in a region, ready for fitting.
 #[derive(Debug)]
-pub struct Scene<'a> {
+pub struct MeasuredScene<'a> {
     /// The region.
     pub region: &'a Region,
     /// Views of it.
     pub views: Vec<&'a View>,
     /// What beams and points say.
     pub evidence: Evidence<'a>,
-    /// The same of those views that suffice for a search.
+    /// What beams and points of those views say that suffice for a search.
     pub scouts: Evidence<'a>,
     /// Noise of the ranges as the points themselves show it, metres, one sigma; not below the
     /// settings' least.
@@ -55,12 +49,17 @@ pub struct Scene<'a> {
     pub(crate) thin: Vec<u32>,
 }
 
-/// Edge of the cells of a cloud without beams, metres.
-const CLOUD_CELL: f32 = 0.02;
-/// How far about its points such a cloud answers, metres.
-const CLOUD_REACH: f32 = 0.10;
+/// The cells of a cloud without beams, metres.
+struct CloudCells {
+    /// Edge of a cell.
+    edge: f32,
+    /// How far about its points the cloud answers.
+    reach: f32,
+}
 
-impl<'a> Scene<'a> {
+const CLOUD: CloudCells = CloudCells { edge: 0.02, reach: 0.10 };
+
+impl<'a> MeasuredScene<'a> {
     /// Whether any of it was seen by a depth camera, which bends surfaces.
     pub(crate) fn has_camera(&self) -> bool {
         self.views.iter().any(|view| view.is_camera)
@@ -78,7 +77,7 @@ impl<'a> Scene<'a> {
         Self::of(region, &views.iter().collect::<Vec<_>>(), floors, settings, fan)
     }
 
-    /// The same for some of the views.
+    /// Gathers and thins the points of some of the views.
     pub(crate) fn of(
         region: &'a Region,
         views: &[&'a View],
@@ -113,7 +112,7 @@ impl<'a> Scene<'a> {
         }
         let cloud = views.iter().all(|view| view.images.is_empty()).then(|| {
             let few = thin.iter().map(|&i| points[i as usize].p).collect();
-            Arc::new(Cloud::new(few, CLOUD_CELL, CLOUD_REACH))
+            Arc::new(Cloud::new(few, CLOUD.edge, CLOUD.reach))
         });
         let scouts = View::scouts(views, region);
         let scouts = Evidence::new(scouts.iter().map(|v| Eye::new(&v.images)), cloud.clone());
@@ -143,6 +142,16 @@ impl<'a> Scene<'a> {
         Hypothesis::at(self.world_from_local().inverse() * world_from_base, posture)
     }
 
+    /// All points that are not on a floor, local frame, each with the index of its view.
+    pub fn local_points(&self) -> impl Iterator<Item = (Point, u16)> {
+        self.points.iter().map(|m| (Point::from(m.p.map(f64::from)), m.view))
+    }
+
+    /// The points that are not on a floor, one a grid cell and view, local frame.
+    pub fn thinned_local_points(&self) -> impl Iterator<Item = Point> {
+        self.thin.iter().map(|&i| Point::from(self.points[i as usize].p.map(f64::from)))
+    }
+
     /// Thinned points, and all points, within `reach` metres of a place, local frame.
     fn within(&self, place: &Point, reach: f64) -> [Vec<u32>; 2] {
         let (c, r2) = (place.coords.cast::<f32>(), (reach * reach) as f32);
@@ -167,7 +176,8 @@ impl<'a> Scene<'a> {
     }
 
     /// Where the scanner of a view stands, local frame; `None` where unknown.
-    pub(crate) fn scanner(&self, view: u16) -> Option<Point> {
+    #[must_use]
+    pub fn scanner(&self, view: u16) -> Option<Point> {
         self.views[usize::from(view)].scanner
     }
 }

@@ -4,7 +4,7 @@ use contract::{Fan, View};
 use geometry::robust::median;
 use nalgebra::{Matrix3, Vector3};
 
-use super::Measured;
+use super::measured::Measured;
 
 /// Noise that is assumed where the points do not tell (shuffled files), metres: a common scanner on
 /// dark steel.
@@ -13,14 +13,21 @@ const UNKNOWN: f64 = 0.003;
 const NEIGHBOURS: f32 = 0.05;
 /// Fewer triples say nothing.
 const MIN_TRIPLES: usize = 60;
-/// Edge of the patches whose flatness is looked at, metres: a depth camera's bumps are as wide.
-const PATCH: f32 = 0.10;
-/// Fewest points of a patch.
-const MIN_PATCH_POINTS: usize = 30;
-/// Fewer patches say nothing.
-const MIN_PATCHES: usize = 40;
-/// Share of the patches that are taken for flat things: most scenes have as many.
-const FLAT_SHARE: f64 = 0.05;
+
+/// Patches whose flatness is looked at.
+struct FlatPatches {
+    /// Edge of a patch, metres: a depth camera's bumps are as wide.
+    edge: f32,
+    /// Fewest points of a patch.
+    min_points: usize,
+    /// Fewer patches say nothing.
+    min_patches: usize,
+    /// Share of the patches that are taken for flat things: most scenes have as many.
+    flat_share: f64,
+}
+
+const PATCHES: FlatPatches =
+    FlatPatches { edge: 0.10, min_points: 30, min_patches: 40, flat_share: 0.05 };
 
 /// Standard deviation of the points, metres: from one point to the next, or over a hand's width
 /// where that is more, as it is for depth cameras, whose neighbours err alike.
@@ -37,7 +44,8 @@ fn between_neighbours(views: &[&View], fan: &dyn Fan) -> Option<f64> {
     median(&mut off).filter(|_| enough).map(|m| 1.4826 * m)
 }
 
-/// How far that is in one view, triple by triple, as the noise of one point.
+/// How far the middle one of three consecutive points of a view lies off, triple by triple, as the
+/// noise of one point.
 fn bends(view: &View) -> Vec<f64> {
     let scanner = view.scanner.map(|s| s.coords.cast::<f32>());
     let triples = view.points.windows(3).step_by((view.points.len() / 20_000).max(1));
@@ -60,19 +68,20 @@ fn over_patches(points: &[Measured], thin: &[u32], fan: &dyn Fan) -> Option<f64>
     let view = |i: &u32| points[*i as usize].view;
     let of_views = thin.chunk_by(|a, b| view(a) == view(b)).collect();
     let mut off = fan.fan(of_views, |own| patches_of(points, own)).concat();
-    if off.len() < MIN_PATCHES {
+    if off.len() < PATCHES.min_patches {
         return None;
     }
     off.sort_by(f64::total_cmp);
-    Some(off[(off.len() as f64 * FLAT_SHARE) as usize])
+    Some(off[(off.len() as f64 * PATCHES.flat_share) as usize])
 }
 
 /// How far points lie off their planes, patch by patch.
 fn patches_of(points: &[Measured], own: &[u32]) -> Vec<f64> {
-    let cell = |i: &u32| points[*i as usize].p.map(|v| (v / PATCH).floor() as i32);
+    let cell = |i: &u32| points[*i as usize].p.map(|v| (v / PATCHES.edge).floor() as i32);
     let mut order = own.to_vec();
     order.sort_by_cached_key(cell);
-    let patches = order.chunk_by(|a, b| cell(a) == cell(b)).filter(|p| p.len() >= MIN_PATCH_POINTS);
+    let patches =
+        order.chunk_by(|a, b| cell(a) == cell(b)).filter(|p| p.len() >= PATCHES.min_points);
     patches.filter_map(|patch| thickness(points, patch)).collect()
 }
 
@@ -86,6 +95,6 @@ fn thickness(points: &[Measured], patch: &[u32]) -> Option<f64> {
         (spread / patch.len() as f64).symmetric_eigenvalues().iter().map(|v| v.max(0.0)).collect();
     values.sort_by(f64::total_cmp);
     // A strip says nothing of its own width.
-    let is_wide = values[1].sqrt() > 0.15 * f64::from(PATCH);
+    let is_wide = values[1].sqrt() > 0.15 * f64::from(PATCHES.edge);
     is_wide.then(|| values[0].sqrt())
 }

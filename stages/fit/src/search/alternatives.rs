@@ -1,24 +1,46 @@
-//! Other postures worth a look, from one that is fitted: other values of one joint, the base turned
-//! under the robot, the flipped wrist, and a new search from the joint on from which the beams
-//! contradict the links (METHOD.md §9).
+//! Finds other postures that are worth refining, from one that is fitted: other values of one
+//! joint, the base turned under the robot, the flipped wrist, and a new search from the first joint
+//! whose links the beams contradict (METHOD.md §9).
 
+use geometry::angle;
 use nalgebra::UnitQuaternion;
 use robot::JointKind;
 use std::f64::consts::{PI, TAU};
 
 use super::{BeamSearch, PeakSweep, Sampling, sort};
-use crate::judge::Judgement;
+use crate::problem::Judgement;
 use crate::state::Hypothesis;
-use crate::turns;
 
 /// Share of the links' and the whole score that an alternative may lack and still be refined.
 const SCORE_SHORT: f64 = 0.15;
-/// Share of a link that beams may go through before it is searched anew (METHOD.md §9).
-const MAX_VIOLATED: f32 = 0.06;
-/// Share of a link's judged surface that must be met, else it is searched anew (METHOD.md §9).
-const MIN_MATCHED: f32 = 0.35;
-/// Smallest share of a link's surface that must be judged for that.
-const MIN_SEEN: f32 = 0.05;
+/// What makes a link be searched anew (METHOD.md §9): beams contradict it.
+struct ContradictedLink {
+    /// Most of its surface that beams may go through, as a share of what was judged.
+    max_violated: f32,
+    /// Least of its judged surface that must be met.
+    min_matched: f32,
+    /// Least of its surface that must have been judged to say so.
+    min_seen: f32,
+}
+
+const CONTRADICTED: ContradictedLink =
+    ContradictedLink { max_violated: 0.06, min_matched: 0.35, min_seen: 0.05 };
+
+/// How a base is turned to where it explains as much.
+struct TurnedBase {
+    /// Yaws that are tried: every 2°. In that arc the base's corners move by half of the tolerance.
+    n_yaws: usize,
+    /// Share of the search's tolerance with which they are scored: where the base stands is known.
+    tolerance: f64,
+    /// Share of its surface by which a yaw may explain less than the one found: the best may lie
+    /// between two.
+    short: f64,
+    /// Most turned bases that are refined.
+    most: usize,
+}
+
+const TURNED: TurnedBase = TurnedBase { n_yaws: 180, tolerance: 0.5, short: 0.05, most: 2 };
+
 /// Hypotheses of a new search that are refined.
 const N_AGAIN: usize = 10;
 
@@ -34,15 +56,6 @@ const BEYOND_LIMIT: f64 = 3.0_f64.to_radians();
 /// Least amplitude of the cosine between the outer axes of three joints, as the middle one turns,
 /// for a flip of the three.
 const MIN_MIRRORED: f64 = 0.5;
-/// Yaws that a base is tried at: every 2°. In that arc its corners move by half of the tolerance.
-const N_YAWS: usize = 180;
-/// Share of the search's tolerance with which they are scored: where the base stands is known.
-const TURNED_TOLERANCE: f64 = 0.5;
-/// Share of its surface by which a yaw may explain less than the one found: the best may lie
-/// between two.
-const TURNED_SHORT: f64 = 0.05;
-/// Most turned bases that are refined.
-const N_TURNED: usize = 2;
 
 impl BeamSearch<'_> {
     /// Other values of single joints that score nearly as well as these or better, best first.
@@ -66,12 +79,12 @@ impl BeamSearch<'_> {
         }
         let frame = model.poses(&h.posture)[joint.parent] * joint.parent_from_joint;
         let closely = || Sampling {
-            tolerance: (TURNED_TOLERANCE * self.steps.tolerance) as f32,
+            tolerance: (TURNED.tolerance * self.steps.tolerance) as f32,
             n_samples: self.settings().n_judge,
         };
         let fixed = &self.problem.prepared.fixed;
         let turn = |k: usize| {
-            let angle = TAU * k as f64 / N_YAWS as f64;
+            let angle = TAU * k as f64 / TURNED.n_yaws as f64;
             let value = self.within_limits(0, h.posture[0] - angle)?;
             let spun = frame * UnitQuaternion::from_axis_angle(&joint.axis, angle);
             let mut next = h.clone();
@@ -79,21 +92,23 @@ impl BeamSearch<'_> {
             next.posture[0] = value;
             Some((self.score_at(&self.placed(&next, fixed), closely()), next))
         };
-        let all: Vec<_> = (0..N_YAWS).map(turn).collect();
+        let all: Vec<_> = (0..TURNED.n_yaws).map(turn).collect();
         let Some((own, _)) = &all[0] else { return Vec::new() };
-        let score = |k: usize| all[k % N_YAWS].as_ref().map_or(f64::NEG_INFINITY, |a| a.0);
+        let score = |k: usize| all[k % TURNED.n_yaws].as_ref().map_or(f64::NEG_INFINITY, |a| a.0);
         let weight: f64 = fixed.iter().map(|&l| self.problem.prepared.links[l].weight).sum();
-        let least = own - TURNED_SHORT * weight;
+        let least = own - TURNED.short * weight;
         let is_peak = |k: &usize| {
-            score(*k) > score(k + 1) && score(*k) >= score(k + N_YAWS - 1) && score(*k) >= least
+            score(*k) > score(k + 1)
+                && score(*k) >= score(k + TURNED.n_yaws - 1)
+                && score(*k) >= least
         };
-        let peaks = (2..N_YAWS - 1).filter(is_peak);
+        let peaks = (2..TURNED.n_yaws - 1).filter(is_peak);
         let mut out: Vec<Hypothesis> = peaks
             .filter_map(|k| all[k].clone())
             .map(|(score, next)| Hypothesis { score: h.score + score - own, ..next })
             .collect();
         sort(&mut out);
-        out.truncate(N_TURNED);
+        out.truncate(TURNED.most);
         out
     }
 
@@ -109,7 +124,7 @@ impl BeamSearch<'_> {
         let sweep = self.steps.sweep(free);
         let apart = |value: f64| match self.problem.prepared.slides(free) {
             true => (value - h.posture[free]).abs(),
-            false => turns::apart(value, h.posture[free]),
+            false => angle::apart(value, h.posture[free]),
         };
         let far = |value: f64| apart(value) > OTHER_STEPS * sweep.span / sweep.n as f64;
         let least = own - SCORE_SHORT * (own.abs() + h.score.abs());
@@ -187,7 +202,7 @@ impl BeamSearch<'_> {
     /// little beyond, since what it was made of may be off.
     fn within_limits(&self, free: usize, value: f64) -> Option<f64> {
         let [low, high] = self.problem.prepared.model.limits(free);
-        let value = turns::within(value, [low - BEYOND_LIMIT, high + BEYOND_LIMIT])?;
+        let value = angle::within(value, [low - BEYOND_LIMIT, high + BEYOND_LIMIT])?;
         Some(value.clamp(low, high))
     }
 
@@ -197,7 +212,9 @@ impl BeamSearch<'_> {
         let bad = |l: usize| {
             let probe = &judgement.probes[l];
             let matched = probe.n_on as f32 / probe.n_seen.max(1) as f32;
-            probe.seen() > MIN_SEEN && (probe.violation() > MAX_VIOLATED || matched < MIN_MATCHED)
+            probe.seen() > CONTRADICTED.min_seen
+                && (probe.violation() > CONTRADICTED.max_violated
+                    || matched < CONTRADICTED.min_matched)
         };
         let first_bad =
             self.problem.prepared.placed_by.iter().position(|links| links.iter().any(|&l| bad(l)));

@@ -1,4 +1,4 @@
-//! First phase: base poses become hypotheses, postures that the beams allow, best first. A beam
+//! First phase: finds hypotheses, postures that the beams allow, from base poses. It is a beam
 //! search along the joints, in which every local maximum of every sweep, to within its steps,
 //! competes with all others (METHOD.md §8, §9).
 
@@ -23,19 +23,25 @@ const FINE_ARC: f64 = 0.67;
 /// Mean score of the links placed so far down to which a search goes on: half of what it is where
 /// no beam reached any of them, as a bench or the arm itself may hide a foot.
 const MOST_HIDDEN: f64 = 0.5 * HIDDEN_PRICE as f64;
-/// Shares of a sweep step by which settled joints and bases are shaken, one after the other.
-const SHAKES: [f64; 2] = [0.5, 0.25];
+
+/// How joints and bases are shaken to settle them.
+struct Shakes {
+    /// Shares of a sweep step, one after the other.
+    steps: [f64; 2],
+    /// Share of the tolerance by which a base is shifted, times the share of the step.
+    shift: f64,
+    /// A base is turned by so much, radians, times the share of the step: what its foot shows of
+    /// its yaw.
+    yaw: f64,
+    /// Turning joints with which the base is shaken: the small links after those say little of it.
+    n_joints: usize,
+}
+
+const SHAKES: Shakes = Shakes { steps: [0.5, 0.25], shift: 0.4, yaw: 0.03, n_joints: 3 };
 /// Share of the tolerance with which settled hypotheses are scored.
 const SETTLE_TOLERANCE: f64 = 0.7;
-/// Share of the tolerance by which a base is shifted to settle it, times the shake.
-const SHAKEN_SHIFT: f64 = 0.4;
-/// A base is turned by so much to settle it, radians, times the shake: what its foot shows of its
-/// yaw.
-const SHAKEN_YAW: f64 = 0.03;
 /// Sweep steps within which, in all joints set so far, two hypotheses are one.
 const TWIN_STEPS: f64 = 1.2;
-/// Turning joints with which the base is settled: the small links after those say little of it.
-const N_SHAKEN: usize = 3;
 /// Tolerance where what carries the searched links is fitted already, metres (METHOD.md §9).
 const FITTED_TOLERANCE: f64 = 0.02;
 
@@ -70,7 +76,7 @@ struct PartScores<'p> {
 }
 
 impl<'a> BeamSearch<'a> {
-    /// For postures of which nothing is known.
+    /// A search for postures of which nothing is known.
     pub(crate) fn new(problem: &Problem<'a>) -> Self {
         let steps = SweepSteps::new(problem, problem.settings.search_tolerance);
         Self { problem: *problem, steps }
@@ -176,7 +182,7 @@ impl BeamSearch<'_> {
         placed.iter().enumerate().map(probe).collect()
     }
 
-    /// Their mean scores, each with the weight of its link.
+    /// Sum of the mean scores of links, each with the weight of its link.
     fn weighted(&self, placed: &[(usize, Pose)], probes: &[Probe]) -> f64 {
         let of = |((link, _), probe): (&(usize, Pose), &Probe)| {
             self.prepared().links[*link].weight * f64::from(probe.mean())
@@ -243,8 +249,8 @@ impl BeamSearch<'_> {
         let mut parts: Vec<f64> = vec![self.score(h, &self.prepared().fixed, tolerance)];
         parts.extend((0..=upto).map(|j| self.score(h, placed(j), tolerance)));
         let turns = |j: &usize| !self.prepared().slides(*j) && !placed(*j).is_empty();
-        let is_shaken = (0..=upto).filter(turns).count() <= N_SHAKEN;
-        for step in SHAKES {
+        let is_shaken = (0..=upto).filter(turns).count() <= SHAKES.n_joints;
+        for step in SHAKES.steps {
             for j in (0..=upto).rev() {
                 let sweep = self.steps.sweep(j);
                 let d = step * sweep.span / sweep.n as f64;
@@ -262,11 +268,11 @@ impl BeamSearch<'_> {
                 continue;
             }
             // Along what it stands on, and about the axis that is upright there.
-            let shift = SHAKEN_SHIFT * step * self.steps.tolerance;
+            let shift = SHAKES.shift * step * self.steps.tolerance;
             let shakes = [
                 Pose::translation(shift, 0.0, 0.0),
                 Pose::translation(0.0, shift, 0.0),
-                Pose::rotation(Vector::z() * (step * SHAKEN_YAW)),
+                Pose::rotation(Vector::z() * (step * SHAKES.yaw)),
             ];
             for shake in shakes {
                 self.climb(h, PartScores { first: 0, all: &mut parts }, tolerance, |h, sign| {
@@ -374,7 +380,7 @@ pub(crate) fn sort(beam: &mut [Hypothesis]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cubes::before_plate;
+    use crate::problem::before_plate;
 
     #[test]
     fn every_second_value_leads_to_the_highest_of_all() {

@@ -1,14 +1,15 @@
-//! Which holes of a flange a tool may be bolted to. The turn of the tool is the sum of the last
-//! joint's and the hole's; only the flange under it tells them apart (METHOD.md §13).
+//! Tells which holes of a flange a tool may be bolted to. The turn of the tool is the sum of the
+//! turns of the last joint and of the hole; only the flange itself tells the two apart (METHOD.md
+//! §13).
 
 use contract::Fan;
+use geometry::angle;
 use robot::Role;
 use std::f64::consts::TAU;
 
 use crate::modes::{AsGood, JointProfile, MODES};
 use crate::problem::Problem;
 use crate::state::Hypothesis;
-use crate::turns;
 
 /// Turns of tool and flange that are tried are so many, or twice, and so on: every turn between
 /// holes, 15°, is one of them.
@@ -83,7 +84,7 @@ pub(super) fn bolts(
         let is_least =
             |k: &usize| costs[*k] <= costs[(k + 1) % n] && costs[*k] <= costs[(k + n - 1) % n];
         for k in (0..n).filter(is_least) {
-            if let Some(value) = turns::within(turning.at(k, n), limits) {
+            if let Some(value) = angle::within(turning.at(k, n), limits) {
                 all.push((costs[k], Bolt { hole, value }));
             }
         }

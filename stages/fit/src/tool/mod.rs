@@ -1,43 +1,62 @@
-//! Whether a tool hangs on a fitted arm, how its joints stand, and the fit of both together
-//! (METHOD.md §13).
+//! Tells whether a tool hangs on a fitted arm and how its joints stand, and fits arm and tool
+//! together (METHOD.md §13).
 
 mod bolts;
 
 use contract::{Fan, Fit};
-use geometry::{Point, Pose};
+use geometry::{Point, Pose, angle};
 use std::f64::consts::TAU;
 
 pub use bolts::Bolt;
 
 use crate::correspond::{MIN_POINTS, distances, worsening};
-use crate::judge::{Judgement, judge};
-use crate::problem::Problem;
+use crate::problem::{Judgement, Problem, judge};
 use crate::refine::{Refined, polish};
 use crate::scene::Nearby;
 use crate::search::BeamSearch;
 use crate::solve::{finish, settle};
 use crate::state::Hypothesis;
-use crate::turns;
-use crate::{Prepared, Scene, Settings};
+use crate::{MeasuredScene, Prepared, Settings};
 
-/// Score of the tool's links from which on it is there: tools that are there have 0.69 and more,
-/// others that are taken for them up to 0.67.
-const MIN_SCORE: f64 = 0.62;
-/// Share of the tool's surface that must have been judged: of tools that are there it was 0.4 and
-/// more.
-const MIN_SEEN: f64 = 0.20;
-/// Tolerance of the judgement, metres: an arm's flange is known to a millimetre.
-const FLANGE_TOLERANCE: f64 = 0.012;
-/// Share that points on nothing may have of those about the tool that are not the arm's: with tools
-/// that are there it is a few hundredths, more where they hold something; with other grippers that
-/// are taken for them, half and more.
-const MAX_STRANGE: f64 = 0.3;
-/// How far about the tool points are looked at for that, metres.
-const ABOUT: f64 = 0.02;
-/// A point farther than this from a surface is not on it, metres; where the scans are noisy, than
-/// so many standard deviations of their noise.
-const STRANGE: f32 = 0.008;
-const STRANGE_SIGMAS: f32 = 4.0;
+/// What the beams must say of a tool that is there.
+struct ToolJudgement {
+    /// Least score of its links: tools that are there have 0.69 and more, others that are taken for
+    /// them up to 0.67.
+    min_score: f64,
+    /// Least share of its surface that must have been judged: of tools that are there it was 0.4
+    /// and more.
+    min_seen: f64,
+    /// Tolerance of the judgement, metres: an arm's flange is known to a millimetre.
+    tolerance: f64,
+}
+
+const IS_THERE: ToolJudgement = ToolJudgement { min_score: 0.62, min_seen: 0.20, tolerance: 0.012 };
+
+/// Points about a tool that are neither on it nor on the arm.
+struct StrangePoints {
+    /// How far about the tool points are looked at, metres.
+    about: f64,
+    /// A point farther than this from a surface is not on it, metres; where the scans are noisy,
+    /// than so many standard deviations of their noise.
+    distance: f32,
+    sigmas: f32,
+    /// Most of them, as a share of the points that are not the arm's: with tools that are there it
+    /// is a few hundredths, more where they hold something; with other grippers that are taken for
+    /// them, half and more.
+    max_share: f64,
+}
+
+const STRANGE: StrangePoints =
+    StrangePoints { about: 0.02, distance: 0.008, sigmas: 4.0, max_share: 0.3 };
+/// Other sides that a tool may look the same from.
+struct OtherSides {
+    /// Turns of the flange that are tried: every 30°.
+    n_turns: i32,
+    /// Share of the squares that another side must do without to be taken: twins differ by less.
+    better: f64,
+}
+
+const OTHER_SIDES: OtherSides = OtherSides { n_turns: 12, better: 0.01 };
 /// Hypotheses of the tool's joints that are judged.
 const N_JUDGED: usize = 5;
 
@@ -52,19 +71,37 @@ pub struct Tooled {
     pub explained: f64,
 }
 
-/// Where the tool stands if it is there. `tooled` is the arm with it, of which the first so many
-/// joints and links are the arm's; the arm stays as it was fitted, but for its last joint, which a
-/// bare flange may not tell.
+/// An arm with a tool on its flange: the first free joints and links of the model are the arm's.
+#[derive(Debug, Clone, Copy)]
+pub struct ArmWithTool<'a> {
+    /// The arm with the tool.
+    pub prepared: &'a Prepared<'a>,
+    /// Free joints of the arm.
+    pub n_joints: usize,
+    /// Links of the arm.
+    pub n_links: usize,
+}
+
+impl ArmWithTool<'_> {
+    /// The arm's last joint, which turns the flange; `None` of an arm without joints.
+    fn flange(&self) -> Option<usize> {
+        self.n_joints.checked_sub(1)
+    }
+}
+
+/// Where the tool stands if it is there. The arm stays as it was fitted, but for its last joint,
+/// which a bare flange may not tell.
 #[must_use]
 pub fn try_tool(
     fit: &Fit,
-    (tooled, [n_joints, n_links]): (&Prepared<'_>, [usize; 2]),
-    scene: &Scene<'_>,
+    arm: ArmWithTool<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Option<Tooled> {
+    let ArmWithTool { prepared: tooled, n_joints, n_links } = arm;
     let start = start(fit, tooled, scene);
-    let first = n_joints.checked_sub(1)?;
+    let first = arm.flange()?;
     let nearby = nearby(&start, tooled, scene);
     let problem = Problem::new(tooled, scene, settings, fan).with_points(&nearby);
     let search = BeamSearch::new(&problem).fitted();
@@ -75,9 +112,10 @@ pub fn try_tool(
         false => search.resume(vec![start], first),
     };
     let judged = found.into_iter().take(N_JUDGED).filter_map(|h| {
-        let judgement = judge(tooled, scene, settings, &h, FLANGE_TOLERANCE);
+        let judgement = judge(tooled, scene, settings, &h, IS_THERE.tolerance);
         let [explained, judged, whole] = of_tool(tooled, n_links, &judgement);
-        let is_there = judged > MIN_SEEN * whole && explained > MIN_SCORE * judged;
+        let is_there =
+            judged > IS_THERE.min_seen * whole && explained > IS_THERE.min_score * judged;
         (is_there && has_own_points(&problem, &h, n_links)).then_some((explained, h))
     });
     let (explained, best) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -85,43 +123,46 @@ pub fn try_tool(
     Some(Tooled { world_from_base, posture: best.posture, explained })
 }
 
-/// Which holes the tool may be bolted to, given as turns about the arm's last joint `flange`,
-/// radians: all that explain the points as well as the best, best first.
+/// Which holes the tool may be bolted to, given as turns about the arm's last joint, radians: all
+/// that explain the points as well as the best, best first.
 #[must_use]
 pub fn bolt(
     start: &Tooled,
-    (tooled, flange): (&Prepared<'_>, usize),
+    arm: ArmWithTool<'_>,
     holes: &[f64],
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Vec<Bolt> {
+    let Some(flange) = arm.flange() else { return Vec::new() };
     let start = scene.hypothesis(&start.world_from_base, start.posture.clone());
-    let nearby = nearby(&start, tooled, scene);
-    let problem = Problem::new(tooled, scene, settings, fan).with_points(&nearby);
+    let nearby = nearby(&start, arm.prepared, scene);
+    let problem = Problem::new(arm.prepared, scene, settings, fan).with_points(&nearby);
     let Refined { hypothesis, .. } = polish(&problem, &start);
     bolts::bolts(&problem, &hypothesis, flange, holes)
 }
 
-/// The fit of arm and tool together from such a start; `flange` is the arm's last joint.
+/// The fit of arm and tool together from a start.
 #[must_use]
 pub fn fit_tool(
     start: &Tooled,
-    (tooled, flange): (&Prepared<'_>, usize),
-    scene: &Scene<'_>,
+    arm: ArmWithTool<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Fit {
+    let tooled = arm.prepared;
     let start = scene.hypothesis(&start.world_from_base, start.posture.clone());
     let nearby = nearby(&start, tooled, scene);
     let problem = Problem::new(tooled, scene, settings, fan).with_points(&nearby);
     let mut settled = settle(&problem, &start);
     // A tool may look the same from several sides.
-    let turned = (1..N_TURNS).filter_map(|k| {
+    let turned = (1..OTHER_SIDES.n_turns).filter_map(|k| {
         let mut h = settled.adjusted.hypothesis.clone();
+        let flange = arm.flange()?;
         let value = h.posture.get_mut(flange)?;
-        let turned = *value + TAU * f64::from(k) / f64::from(N_TURNS);
-        *value = turns::within(turned, tooled.model.limits(flange))?;
+        let turned = *value + TAU * f64::from(k) / f64::from(OTHER_SIDES.n_turns);
+        *value = angle::within(turned, tooled.model.limits(flange))?;
         Some(h)
     });
     let mut others = fan.fan(turned.collect(), |h| polish(&problem, &h));
@@ -130,7 +171,7 @@ pub fn fit_tool(
     let worse = |other: &Refined| worsening(&problem, own, &other.hypothesis);
     let all_worse: Vec<f64> = others.iter().map(worse).collect();
     let best = (0..others.len()).min_by(|a, b| all_worse[*a].total_cmp(&all_worse[*b]));
-    if let Some(best) = best.filter(|best| all_worse[*best] < -BETTER) {
+    if let Some(best) = best.filter(|best| all_worse[*best] < -OTHER_SIDES.better) {
         let other = settle(&problem, &others[best].hypothesis);
         let before = std::mem::replace(&mut settled, other);
         others.push(before.refined());
@@ -139,16 +180,11 @@ pub fn fit_tool(
 }
 
 /// Points that may be the robot's.
-fn nearby(start: &Hypothesis, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Nearby {
+fn nearby(start: &Hypothesis, tooled: &Prepared<'_>, scene: &MeasuredScene<'_>) -> Nearby {
     scene.nearby(tooled, &Point::from(start.local_from_base.translation.vector))
 }
 
-/// Share of the squares that another side must do without to be taken: twins differ by less.
-const BETTER: f64 = 0.01;
-/// Turns of the flange that a tool may look alike at: every 30°.
-const N_TURNS: i32 = 12;
-
-fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &Scene<'_>) -> Hypothesis {
+fn start(fit: &Fit, tooled: &Prepared<'_>, scene: &MeasuredScene<'_>) -> Hypothesis {
     let mut posture = tooled.model.home();
     for (own, joint) in posture.iter_mut().zip(&fit.joints) {
         *own = joint.value;
@@ -165,17 +201,18 @@ fn has_own_points(problem: &Problem<'_>, h: &Hypothesis, first: usize) -> bool {
         let p = problem.scene.points[*i as usize].p;
         tool.iter().any(|(l, frame)| {
             let q = geometry::depth::transform(frame, p).map(f64::from);
-            problem.prepared.model.links[*l].bounds.grown(ABOUT).contains(q)
+            problem.prepared.model.links[*l].bounds.grown(STRANGE.about).contains(q)
         })
     };
     let about: Vec<u32> = problem.thin.iter().copied().filter(is_about).collect();
-    let limit = STRANGE.max(STRANGE_SIGMAS * problem.scene.noise as f32);
+    let limit = STRANGE.distance.max(STRANGE.sigmas * problem.scene.noise as f32);
     let arm = distances(problem, h, &about, |l| l < first);
     let own = distances(problem, h, &about, |l| l >= first);
     let beside: Vec<f32> =
         own.into_iter().zip(arm).filter(|(_, arm)| *arm > limit).map(|(own, _)| own).collect();
     let n_strange = beside.iter().filter(|d| **d > limit).count();
-    beside.len() - n_strange >= MIN_POINTS && (n_strange as f64) < MAX_STRANGE * beside.len() as f64
+    beside.len() - n_strange >= MIN_POINTS
+        && (n_strange as f64) < STRANGE.max_share * beside.len() as f64
 }
 
 /// Surface of the links from `first` on: explained less contradicted, judged, and the whole of it,

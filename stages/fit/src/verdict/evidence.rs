@@ -1,5 +1,5 @@
-//! A fit, its judgement by the beams and the scene in; the numbers and properties that the rules of
-//! the verdict ask for out.
+//! Collects the numbers and properties of a fit that the rules of the verdict ask for, from the
+//! fit, its judgement by the beams, and the scene.
 
 use contract::words::{Unit, count};
 use contract::{Fit, JointFit};
@@ -9,9 +9,9 @@ use super::rule::{Answers, Property, Quantity, Subject};
 use super::thresholds::{KNOWN_SIGMA, MOST_EXCUSED_NOISE, STOP_PLAY};
 use super::words;
 use crate::adjust::Adjusted;
-use crate::judge::Judgement;
 use crate::modes::trade_off;
-use crate::{Prepared, Scene};
+use crate::problem::Judgement;
+use crate::{MeasuredScene, Prepared};
 
 /// What a fit is judged by, besides its own values.
 #[derive(Clone, Copy)]
@@ -19,7 +19,7 @@ pub(crate) struct JudgedFit<'a> {
     /// The model.
     pub(crate) prepared: &'a Prepared<'a>,
     /// What was measured.
-    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) scene: &'a MeasuredScene<'a>,
     /// What the beams say of the fitted posture.
     pub(crate) judgement: &'a Judgement,
     /// Standard deviations of the joints by the scatter of the points, radians or metres, where
@@ -44,7 +44,7 @@ pub(super) struct FitEvidence {
     held: JointShare,
     /// Joints that are known with all that may widen their deviations.
     known: JointShare,
-    /// The same without the last joint.
+    /// Known joints without the last joint.
     known_but_last: JointShare,
     determined: JointShare,
     /// Margin of the best over another posture; infinite where there is no other.
@@ -58,7 +58,7 @@ pub(super) struct FitEvidence {
     joints: Vec<JointKnown>,
 }
 
-/// So many joints of all that are asked about.
+/// A number of joints, and the number of all that are asked about.
 #[derive(Debug, Clone, Copy, Default)]
 struct JointShare {
     n: usize,
@@ -85,7 +85,7 @@ struct SceneNoise {
 }
 
 impl SceneNoise {
-    fn of(scene: &Scene<'_>) -> Self {
+    fn of(scene: &MeasuredScene<'_>) -> Self {
         let all = scene.noise;
         Self { all, excused: if scene.has_camera() { all } else { all.min(MOST_EXCUSED_NOISE) } }
     }
@@ -110,12 +110,12 @@ struct JointKnown {
     slides: bool,
     is_last: bool,
     is_determined: bool,
-    /// As in `result.json`.
+    /// The word for it in `result.json`.
     certainty: &'static str,
     sigma: f64,
-    /// By the covariance alone.
+    /// Standard deviation by the covariance alone.
     own_sigma: f64,
-    /// How far it stands beyond its limit and the play of its stop; below 0 within them.
+    /// How far the joint stands beyond its limit and the play of its stop; below 0 within them.
     beyond_limit: f64,
     /// Points on the links that it moves.
     n_points: usize,
@@ -124,7 +124,7 @@ struct JointKnown {
 }
 
 impl FitEvidence {
-    /// That of a fit whose values are known, and whose verdict is not.
+    /// The evidence of a fit whose values are known, and whose verdict is not.
     pub(super) fn of(fit: &Fit, judged: &JudgedFit<'_>) -> Self {
         let JudgedFit { prepared, scene, judgement, held } = judged;
         let n = fit.joints.len();
@@ -149,21 +149,21 @@ impl FitEvidence {
             has_scanners,
             is_only_scanners: has_scanners && !scene.has_camera(),
             trade_off: trade_off(fit, &turning),
-            links: (0..fit.links.len()).map(|l| LinkSeen::of(fit, l, (prepared, held))).collect(),
+            links: (0..fit.links.len()).map(|l| LinkSeen::of(fit, l, prepared, held)).collect(),
             joints: (0..n).map(|j| JointKnown::of(fit, j, prepared)).collect(),
         }
     }
 
-    /// As far as an adjustment tells before the fit is reported.
-    pub(super) fn before_report(best: &Adjusted, scene: &Scene<'_>) -> Self {
+    /// The evidence that an adjustment gives before the fit is reported.
+    pub(super) fn before_report(best: &Adjusted, scene: &MeasuredScene<'_>) -> Self {
         let n = best.hypothesis.posture.len();
         let is_known = |j: &usize| best.covariance[(6 + j, 6 + j)] < KNOWN_SIGMA * KNOWN_SIGMA;
         let held = JointShare::of_all((0..n).filter(is_known).count(), n);
         Self { rms: best.rms(), noise: SceneNoise::of(scene), held, ..Self::default() }
     }
 
-    /// As far as a reported fit tells of how well its surface agrees with what was measured.
-    pub(super) fn of_surface(fit: &Fit, scene: &Scene<'_>) -> Self {
+    /// The evidence of a reported fit on how well its surface agrees with what was measured.
+    pub(super) fn of_surface(fit: &Fit, scene: &MeasuredScene<'_>) -> Self {
         let link = |link: &contract::LinkEvidence| LinkSeen {
             seen: link.seen,
             violation: link.violated,
@@ -194,7 +194,7 @@ impl FitEvidence {
 }
 
 impl LinkSeen {
-    fn of(fit: &Fit, l: usize, (prepared, held): (&Prepared<'_>, &[f64])) -> Self {
+    fn of(fit: &Fit, l: usize, prepared: &Prepared<'_>, held: &[f64]) -> Self {
         let link = &fit.links[l];
         Self {
             name: link.name.clone(),

@@ -1,4 +1,4 @@
-//! The table of verdict rules in; the part of METHOD.md §15 that is made from it, in Markdown, out.
+//! Writes the part of METHOD.md §15 that is made from the table of verdict rules, in Markdown.
 
 use contract::Verdict;
 use contract::words::Unit;

@@ -1,6 +1,6 @@
-//! The words that the table of verdict rules is written in: numbers and properties of a fit that a
-//! rule asks for, thresholds with their reasons, tests, exemptions, rows. A row in and answers to
-//! its tests in; whether it holds, and the sentence that people read, out.
+//! The terms that the table of verdict rules is written in: numbers and properties of a fit that a
+//! rule asks for, thresholds with their reasons, tests, exemptions, rows. With the answers to its
+//! tests a row says whether it holds, and gives the sentence that people read.
 
 use contract::Verdict;
 
@@ -154,11 +154,11 @@ pub(super) struct VerdictRule {
 /// How an event changes the verdict; `None` stands for the verdict that the event carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum VerdictChange {
-    /// It becomes this, and all earlier reasons go.
+    /// The verdict becomes this, and all earlier reasons go.
     Set(Verdict),
-    /// It becomes no better than this.
+    /// The verdict becomes no better than this.
     AtMost(Option<Verdict>),
-    /// It becomes no worse than this.
+    /// The verdict becomes no worse than this.
     AtLeast(Option<Verdict>),
 }
 

@@ -1,10 +1,10 @@
-//! A joint that the points do not determine in; where else it may stand, in words, out.
+//! States in words where else a joint may stand that the points do not determine.
 
 use contract::words::Unit;
 use contract::{Certainty, Fit};
+use geometry::angle;
 
 use super::thresholds::KNOWN_SIGMA;
-use crate::turns;
 
 /// Standard deviation from which on the values that are named are but some of those that a joint
 /// may have, radians (30°).
@@ -16,7 +16,7 @@ const MAX_VALUES: usize = 3;
 /// degrees or millimetres. Empty where there are none.
 pub(super) fn elsewhere(fit: &Fit, j: usize, slides: bool) -> String {
     let (joint, unit) = (&fit.joints[j], Unit::of(slides));
-    let apart = |a: f64, b: f64| turns::apart(a, b) > KNOWN_SIGMA;
+    let apart = |a: f64, b: f64| angle::apart(a, b) > KNOWN_SIGMA;
     let mut values: Vec<f64> = Vec::new();
     let equals = fit.equals.iter().filter_map(|equal| equal.posture.get(j).copied());
     for value in equals.filter(|v| apart(*v, joint.value)) {

@@ -1,5 +1,5 @@
-//! How well base, joints and the scans' errors are known, by the normal equations and the residuals
-//! (METHOD.md §14.1).
+//! The covariance of base, joints and the scans' errors, from the normal equations and the
+//! residuals (METHOD.md §14.1).
 
 use nalgebra::{DMatrix, DVector};
 

@@ -6,15 +6,17 @@
 //! `A_c = Σ w J φᵀ`, `R_c = Σ w r φ`, `W_c = Σ w φ φᵀ`.
 
 mod covariance;
+mod patch_sums;
 mod shape;
 
 use contract::Fan;
 use geometry::robust;
-use nalgebra::{DMatrix, DMatrixView, DVector, Dyn, OMatrix, U5};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
-use crate::model::{Patches, Shape, ShapeSquare, Smoothness};
+use crate::model::{Patches, Shape, Smoothness};
 use crate::refine::add_scaled;
 use crate::state::N_SCAN;
+use patch_sums::PatchSums;
 use shape::PatchedSums;
 
 /// One residual.
@@ -34,34 +36,6 @@ pub(crate) struct ResidualRow<'a> {
     /// The residual, metres.
     pub(crate) r: f64,
 }
-
-/// Sums over one patch.
-#[derive(Debug, Clone)]
-struct PatchSums {
-    /// Σ w J φᵀ.
-    a: Columns,
-    /// Its part of the gradient: Σ w J r, less what offsets explain once they are taken out.
-    g: DVector<f64>,
-    /// Σ w φ φᵀ.
-    weight: ShapeSquare,
-    /// Σ w r φ.
-    r: Shape,
-}
-
-impl PatchSums {
-    fn new(n: usize) -> Self {
-        let (a, g) = (Columns::zeros(n), DVector::zeros(n));
-        Self { a, g, weight: ShapeSquare::zeros(), r: Shape::zeros() }
-    }
-
-    /// Σ w.
-    fn total(&self) -> f64 {
-        self.weight[(0, 0)]
-    }
-}
-
-/// A column for each.
-type Columns = OMatrix<f64, Dyn, U5>;
 
 /// Residuals whose products are added together.
 const BATCH: usize = 64;
@@ -275,7 +249,7 @@ impl Normal {
         self.sigma2.sqrt()
     }
 
-    /// How smooth those are.
+    /// How smooth the offsets are.
     pub(crate) fn smoothness(&self) -> Smoothness {
         self.smoothness
     }
@@ -292,18 +266,22 @@ fn patch_variance<'a>(patches: impl Iterator<Item = &'a PatchSums>) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for patch in patches.filter(|p| p.total() > 0.0) {
         let noise2 = 1.0 / patch.total();
-        let mean = (patch.r[0] / patch.total()).clamp(-MAX_OFFSET, MAX_OFFSET);
-        let weight = (TYPICAL_OFFSET * TYPICAL_OFFSET + noise2).powi(-2);
+        let mean = (patch.r[0] / patch.total()).clamp(-OFFSETS.most, OFFSETS.most);
+        let weight = (OFFSETS.typical * OFFSETS.typical + noise2).powi(-2);
         sum += weight * (mean * mean - noise2);
         total += weight;
     }
     if total > 0.0 { (sum / total).max(0.0) } else { 0.0 }
 }
 
-/// Offsets that models have, metres.
-const TYPICAL_OFFSET: f64 = 0.001;
-/// Larger mean residuals are things beside the robot, not its shape, metres.
-const MAX_OFFSET: f64 = 0.008;
+/// Offsets that the shapes of models have, metres.
+struct ShapeOffsets {
+    typical: f64,
+    /// Larger mean residuals are things beside the robot, not its shape.
+    most: f64,
+}
+
+const OFFSETS: ShapeOffsets = ShapeOffsets { typical: 0.001, most: 0.008 };
 
 #[cfg(test)]
 mod tests {

@@ -9,7 +9,7 @@ use contract::Fan;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SMatrix};
 use std::ops::Range;
 
-use super::PatchSums;
+use super::patch_sums::PatchSums;
 use crate::model::{Kernel, N_SMOOTH, PatchPlace, Patches, Shape, ShapeSquare, Smoothness};
 
 /// Lengths over which surfaces of castings, hulls and sheets are off alike, metres; the middle one
@@ -286,21 +286,27 @@ impl Offsets<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Columns;
+    use super::super::patch_sums::PatchColumns;
     use super::*;
     use crate::model::HALF_PATCH;
     use contract::OneByOne;
     use nalgebra::Vector3;
 
+    /// The patches of a link, and the sums of their residuals.
+    struct LinkPatches {
+        sums: Vec<Option<PatchSums>>,
+        of: Patches,
+    }
+
     /// A link of two sides, ten patches each along a line, on which an offset of `wave` lies; one
     /// unknown shifts all.
-    fn link(wave: impl Fn(usize, f64) -> f64) -> (Vec<Option<PatchSums>>, Patches) {
+    fn link(wave: impl Fn(usize, f64) -> f64) -> LinkPatches {
         let (weight, mut patches, mut of) = (1e9, Vec::new(), Patches::default());
         for i in 0..20_usize {
             let (side, x) = (i / 10, (i % 10) as f64 * 0.13);
             let normal = if side == 0 { 1.0 } else { -1.0 };
             let r = weight * wave(side, x);
-            let a = Columns::from_row_slice(&[weight * normal, 0.0, 0.0, 0.0, 0.0]);
+            let a = PatchColumns::from_row_slice(&[weight * normal, 0.0, 0.0, 0.0, 0.0]);
             let g = DVector::from_element(1, r * normal);
             let weight = ShapeSquare::from_diagonal(&Shape::new(weight, 0.0, 0.0, 0.0, 0.0));
             patches.push(Some(PatchSums { g, a, weight, r: Shape::new(r, 0.0, 0.0, 0.0, 0.0) }));
@@ -308,10 +314,10 @@ mod tests {
             let x = Vector3::new(x, 0.0, 0.05 * normal);
             of.places.push(PatchPlace::new(x, Vector3::new(0.0, 0.0, normal)));
         }
-        (patches, of)
+        LinkPatches { sums: patches, of }
     }
 
-    fn chosen((mut patches, of): (Vec<Option<PatchSums>>, Patches)) -> (Smoothness, f64) {
+    fn chosen(LinkPatches { sums: mut patches, of }: LinkPatches) -> (Smoothness, f64) {
         let sums = patches.iter().flatten().map(PatchSums::total).sum::<f64>();
         let (mut h, mut g) = (DMatrix::from_element(1, 1, sums), DVector::zeros(1));
         let whole =
@@ -326,9 +332,9 @@ mod tests {
     fn residuals_tell_how_smooth_they_are() {
         let smooth = |x: f64| 1e-3 * (9.0 * x).sin();
         // Half of one side is not seen.
-        let (mut patches, of) = link(|_, x| smooth(x) + 1e-3);
-        patches[15..].fill(None);
-        let (thick, shift) = chosen((patches, of));
+        let mut half = link(|_, x| smooth(x) + 1e-3);
+        half.sums[15..].fill(None);
+        let (thick, shift) = chosen(half);
         let sides = |s: Smoothness| match s {
             Smoothness::Field(kernel) => Some(kernel.sides),
             Smoothness::Apart => None,
@@ -345,7 +351,8 @@ mod tests {
 
     #[test]
     fn offsets_apart_are_those_of_sherman_and_morrison() {
-        let (mut patches, of) = link(|side, x| 1e-3 * x + 2e-4 * side as f64);
+        let link = link(|side, x| 1e-3 * x + 2e-4 * side as f64);
+        let LinkPatches { sums: mut patches, of } = link;
         let before = patches.clone();
         let sigma2 = 4e-7;
         let (mut h, mut g) = (DMatrix::zeros(1, 1), DVector::zeros(1));
@@ -368,7 +375,7 @@ mod tests {
         let (w, sigma2) = (1e12, 1e-6);
         let weight = ShapeSquare::from_diagonal(&Shape::new(w, w / 3.0, w / 3.0, 0.0, 0.0));
         let turn = HALF_PATCH * w / 3.0;
-        let a = Columns::from_row_slice(&[0.0, turn, 0.0, 0.0, 0.0]);
+        let a = PatchColumns::from_row_slice(&[0.0, turn, 0.0, 0.0, 0.0]);
         let mut patches =
             vec![Some(PatchSums { a, g: DVector::zeros(1), weight, r: Shape::zeros() })];
         let places = vec![PatchPlace::new(Vector3::zeros(), Vector3::z())];

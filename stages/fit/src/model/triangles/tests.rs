@@ -45,14 +45,14 @@ fn meshes_of_any_size_are_looked_through() {
     let vertices = mesh.vertices.iter().map(|p| p.map(|v| 1000.0 * v)).collect();
     let large = Mesh { vertices, ..mesh };
     let triangles = Triangles::new(&large);
-    assert!(triangles.begins.len() <= MAX_CELLS as usize + 1);
+    assert!(triangles.begins.len() <= MOST.cells as usize + 1);
     let (at, down) = (Vector::new(200.0, 300.0, 0.001), -Vector::z());
     let met = meet(&triangles, at, down).expect("the top");
     assert!((met.n - Vector::z()).norm() < 1e-6);
     // A rod a million kilometres long, of no width.
     let vertices = vec![[0.0; 3], [1e9, 0.0, 0.0], [0.0, 1e-9, 0.0]];
     let rod = Mesh { vertices, triangles: vec![[0, 1, 2]] };
-    assert!(Triangles::new(&rod).begins.len() <= MAX_CELLS as usize + 1);
+    assert!(Triangles::new(&rod).begins.len() <= MOST.cells as usize + 1);
     let nothing = Mesh { vertices: Vec::new(), triangles: Vec::new() };
     assert!(meet(&Triangles::new(&nothing), at, down).is_none());
 }

@@ -1,11 +1,12 @@
-//! Problems for tests: a robot of few boxes, of whose front a scanner measured some places.
+//! Problems for tests: a robot made of a few boxes, and a scanner that measured parts of its front.
 
 use contract::{MaskId, OneByOne, Region, ScanId, View};
 use geometry::{Aabb, Point, Pose};
 
-use crate::problem::{AdjustState, Problem};
+use super::adjust_state::AdjustState;
+use super::context::Problem;
 use crate::state::Hypothesis;
-use crate::{Prepared, Scene, Settings};
+use crate::{MeasuredScene, Prepared, Settings};
 
 /// A chain of boxes about their joints: name, kind of the joint to the link before, and size, place
 /// and axis of that joint.
@@ -119,7 +120,7 @@ fn measured(
     };
     let region = Region { origin: Point::origin(), bounds: Aabb::EMPTY };
     let (views, settings) = ([view], Settings::default());
-    let scene = Scene::new(&region, &views, &[], &settings, &OneByOne);
+    let scene = MeasuredScene::new(&region, &views, &[], &settings, &OneByOne);
     let problem = Problem::new(&prepared, &scene, &settings, &OneByOne);
     let hypothesis = Hypothesis::at(Pose::identity(), posture.to_vec());
     look(&problem, &AdjustState::at(&hypothesis, &scene));

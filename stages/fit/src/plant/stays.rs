@@ -1,32 +1,34 @@
-//! A candidate and scans that contradict each other in; out come the groups of scans in which the
-//! robot stood still, as a fit with the others beside it: somebody moved the robot between two
-//! stations.
+//! Tells in which scans a robot stood in which posture, where somebody moved it between two
+//! stations and the scans contradict each other.
 
 use contract::words::count;
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Verdict, View};
 use geometry::{Point, Pose};
 
-use crate::judge::judged;
-use crate::problem::Problem;
+use crate::problem::{Problem, judged};
 use crate::solve::{fit, quick};
 use crate::state::Hypothesis;
 use crate::verdict::{self, MIN_AGREEING, VerdictEvent};
-use crate::{Prepared, Scene, Settings};
+use crate::{MeasuredScene, Prepared, Settings};
 
-/// Share of a scan's judged surface of the moving links, explained less contradicted, from which on
-/// a posture that another scan tells stands in it too.
-const AGREES: f64 = 0.35;
-/// Share of the moving surface that a scan must have judged to say anything.
-const MIN_JUDGED: f64 = 0.03;
+/// When a posture that another scan tells stands in a scan, too.
+struct AgreeingScan {
+    /// Least share of the judged surface of the moving links, explained less contradicted.
+    min_score: f64,
+    /// Share of the moving surface that the scan must have judged to say anything.
+    min_judged: f64,
+}
+
+const AGREES: AgreeingScan = AgreeingScan { min_score: 0.35, min_judged: 0.03 };
 /// Most postures of one robot that are told apart.
 const MAX_STAYS: usize = 4;
 
 /// What is seen of a region, scan by scan.
 #[derive(Debug, Clone, Copy)]
-pub struct Sights<'a> {
+pub struct ScansOfRegion<'a> {
     /// The region.
     pub region: &'a Region,
-    /// Its views.
+    /// Views of the region.
     pub views: &'a [View],
     /// Planes about it, world.
     pub floors: &'a [InstallationPlane],
@@ -39,7 +41,7 @@ pub struct Sights<'a> {
 pub fn stays(
     candidate: &Candidate,
     prepared: &Prepared<'_>,
-    sights: &Sights<'_>,
+    sights: &ScansOfRegion<'_>,
     settings: &Settings,
     fan: &dyn Fan,
 ) -> Option<Fit> {
@@ -65,7 +67,7 @@ pub fn stays(
         }
         left.retain(|v| !own.contains(v));
         let views: Vec<&View> = own.iter().map(|&v| singles[v].view).collect();
-        let scene = Scene::of(sights.region, &views, sights.floors, settings, fan);
+        let scene = MeasuredScene::of(sights.region, &views, sights.floors, settings, fan);
         let found = fit(&candidate, prepared, &scene, settings, fan);
         let is_plain = |f: &Fit| match own.len() < MIN_AGREEING {
             true => f.verdict == Verdict::Trusted,
@@ -88,7 +90,7 @@ pub fn stays(
         };
         out.push((found, h));
     }
-    together(out, &left, &singles, (prepared, settings))
+    together(out, &left, &singles, prepared, settings)
 }
 
 /// One fit of all groups; scans that show too little for a posture of their own go with the one
@@ -97,7 +99,8 @@ fn together(
     mut groups: Vec<(Fit, Hypothesis)>,
     left: &[usize],
     singles: &[Single<'_>],
-    (prepared, settings): (&Prepared<'_>, &Settings),
+    prepared: &Prepared<'_>,
+    settings: &Settings,
 ) -> Option<Fit> {
     let mut n_silent = 0;
     for &u in left {
@@ -129,13 +132,13 @@ fn together(
 /// Whether a scan shows what a posture asks for: explained, judged and whole surface of the moving
 /// links, m².
 fn bears_out([net, judged, whole]: &[f64; 3]) -> bool {
-    *judged > MIN_JUDGED * whole && *net > AGREES * judged
+    *judged > AGREES.min_judged * whole && *net > AGREES.min_score * judged
 }
 
 /// One scan alone, and the posture that it shows, if it shows one.
 struct Single<'a> {
     view: &'a View,
-    scene: Scene<'a>,
+    scene: MeasuredScene<'a>,
     found: Option<Hypothesis>,
 }
 
@@ -144,11 +147,11 @@ impl<'a> Single<'a> {
         view: &'a View,
         candidate: &Candidate,
         prepared: &Prepared<'_>,
-        sights: &Sights<'a>,
+        sights: &ScansOfRegion<'a>,
         settings: &Settings,
         fan: &dyn Fan,
     ) -> Self {
-        let scene = Scene::of(sights.region, &[view], sights.floors, settings, fan);
+        let scene = MeasuredScene::of(sights.region, &[view], sights.floors, settings, fan);
         let local_from_world = scene.world_from_local().inverse();
         let bases: Vec<Pose> =
             candidate.bases.iter().map(|(pose, _)| local_from_world * pose).collect();

@@ -1,16 +1,16 @@
-//! A posture whose joints before one are set in; that joint's value by a sweep in equal steps out
-//! (the source, §4).
+//! Sweeps one joint in equal steps, the joints before it set: the rough value of the joint (the
+//! source, §4).
 
 use geometry::{Point, Pose, Vector};
 use robot::JointKind;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::Paper;
-use crate::state::Hypothesis;
+use crate::context::SequentialFit;
+use crate::posture::Placement;
 
-/// How closely a link is looked at.
+/// How closely a link is compared with what was measured.
 #[derive(Clone, Copy)]
-struct Look {
+struct LinkSampling {
     /// Samples of it.
     n_samples: usize,
     /// Distances count up to this, metres: beyond, one place is as wrong as another.
@@ -18,27 +18,40 @@ struct Look {
 }
 
 /// Over all of a joint's range, and round the best.
-const LOOKS: [Look; 2] = [Look { n_samples: 240, cap: 0.05 }, Look { n_samples: 800, cap: 0.02 }];
-/// Of the base.
-const BASE: Look = Look { n_samples: 960, cap: 0.05 };
+const SWEEPS: [LinkSampling; 2] =
+    [LinkSampling { n_samples: 240, cap: 0.05 }, LinkSampling { n_samples: 800, cap: 0.02 }];
+/// How closely the base is compared.
+const BASE: LinkSampling = LinkSampling { n_samples: 960, cap: 0.05 };
 /// A sample moves off its surface if a quarter turn takes it farther than this from it, metres.
 const OFF_SURFACE: f32 = 0.012;
 
-impl Paper<'_> {
+/// Values of one joint that are tried.
+struct TriedValues {
+    joint: usize,
+    /// Radians or metres.
+    values: Vec<f64>,
+}
+
+impl SequentialFit<'_> {
     /// The value with the smallest mean distance: that of the joint's own link, or, where that is
     /// nearly symmetric about the joint's axis, together with the next one's best.
-    pub(super) fn sweep(&self, h: &Hypothesis, joint: usize) -> f64 {
+    pub(crate) fn sweep(&self, h: &Placement, joint: usize) -> f64 {
         let next = (joint + 1..h.posture.len()).find(|&j| !self.prepared.placed_by[j].is_empty());
         let ahead = next.filter(|_| self.is_near_symmetric(joint));
         let mut best: Option<[f64; 2]> = None;
         let mut before = f64::INFINITY;
-        for (step, look) in self.settings.sweep_step.into_iter().zip(LOOKS) {
+        for (step, sampling) in self.settings.sweep_step.into_iter().zip(SWEEPS) {
             // Round the best so far, two steps of the round before to each side.
             let near = |which: usize| best.map(|b| (b[which], 2.0 * before));
             let own = self.values(joint, near(0), step);
             // The child's own angle needs only be near for its parent's to be told.
-            let child = ahead.map(|next| (next, self.values(next, near(1), 2.0 * step)));
-            let tried = own.into_iter().map(|value| self.tried(h, (joint, value), &child, look));
+            let values = |next: usize| self.values(next, near(1), 2.0 * step);
+            let child = ahead.map(|next| TriedValues { joint: next, values: values(next) });
+            let tried = own.into_iter().map(|value| {
+                let mut trial = h.clone();
+                trial.posture[joint] = value;
+                self.tried(trial, joint, child.as_ref(), sampling)
+            });
             best = tried.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at);
             before = step;
         }
@@ -54,21 +67,21 @@ impl Paper<'_> {
         (0..=n as usize).map(value).collect()
     }
 
-    /// Mean distance with a joint at a value, and those of the joint and of its child.
+    /// Mean distance with a joint as a posture has it, with the best value of its child where that
+    /// is tried, too; and the values of the joint and of its child.
     fn tried(
         &self,
-        h: &Hypothesis,
-        (joint, value): (usize, f64),
-        child: &Option<(usize, Vec<f64>)>,
-        look: Look,
+        mut trial: Placement,
+        joint: usize,
+        child: Option<&TriedValues>,
+        sampling: LinkSampling,
     ) -> (f64, [f64; 2]) {
-        let mut trial = h.clone();
-        trial.posture[joint] = value;
-        let own = self.off(&trial, joint, look);
-        let Some((next, values)) = child else { return (own, [value, 0.0]) };
-        let turned = values.iter().map(|&v| {
-            trial.posture[*next] = v;
-            (self.off(&trial, *next, look), v)
+        let value = trial.posture[joint];
+        let own = self.off(&trial, joint, sampling);
+        let Some(child) = child else { return (own, [value, 0.0]) };
+        let turned = child.values.iter().map(|&v| {
+            trial.posture[child.joint] = v;
+            (self.off(&trial, child.joint, sampling), v)
         });
         let (least, at) = turned.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0.0));
         (own + least, [value, at])
@@ -83,17 +96,17 @@ impl Paper<'_> {
     }
 
     /// Mean distance of the visible samples of a joint's links from what was measured, metres.
-    fn off(&self, h: &Hypothesis, joint: usize, look: Look) -> f64 {
+    fn off(&self, h: &Placement, joint: usize, sampling: LinkSampling) -> f64 {
         let model = self.prepared.model;
         let poses = model.poses(&h.posture);
         let placed = |l: usize| (l, h.local_from_base * poses[l]);
         let parent = placed(model.joints[model.free[joint]].parent);
         let links = &self.prepared.placed_by[joint];
-        self.off_links(links.iter().map(|&l| placed(l)), Some(parent), look)
+        self.off_links(links.iter().map(|&l| placed(l)), Some(parent), sampling)
     }
 
-    /// That of the base.
-    pub(super) fn off_base(&self, local_from_base: &Pose) -> f64 {
+    /// Mean distance of the visible samples of the base from what was measured, metres.
+    pub(crate) fn off_base(&self, local_from_base: &Pose) -> f64 {
         let base = (self.base, local_from_base * self.base_pose());
         self.off_links([base].into_iter(), None, BASE)
     }
@@ -104,7 +117,7 @@ impl Paper<'_> {
         &self,
         links: impl Iterator<Item = (usize, Pose)>,
         parent: Option<(usize, Pose)>,
-        look: Look,
+        sampling: LinkSampling,
     ) -> f64 {
         let (mut sum, mut n) = (0.0, 0_usize);
         let is_within = |at: &Point| {
@@ -114,21 +127,21 @@ impl Paper<'_> {
             })
         };
         for (link, pose) in links {
-            let (points, normals) = self.prepared.samples(link, look.n_samples);
+            let (points, normals) = self.prepared.samples(link, sampling.n_samples);
             for (p, normal) in points.iter().zip(normals) {
                 let at = pose * Point::from(p.map(f64::from));
                 if is_within(&at) {
                     continue;
                 }
                 let facing = pose.rotation * Vector::from(normal.map(f64::from));
-                let found = self.lattices.nearest(&at, &facing, self.settings.window, look.cap);
+                let found = self.grids.nearest(&at, &facing, self.settings.window, sampling.cap);
                 if let Some(d) = found {
                     sum += d;
                     n += 1;
                 }
             }
         }
-        if n == 0 { look.cap } else { sum / n as f64 }
+        if n == 0 { sampling.cap } else { sum / n as f64 }
     }
 
     /// Whether few samples of the joint's links leave their surface in a quarter turn.
@@ -149,9 +162,8 @@ impl Paper<'_> {
             for p in points {
                 let q = motion * Point::from(p.map(f64::from));
                 let q = [q.x as f32, q.y as f32, q.z as f32];
-                let fields = &self.prepared.links[link].fields;
-                let near = fields.fine.nearest(q).is_some_and(|at| {
-                    let d: f32 = (0..3).map(|i| (fields.facets[at].x[i] - q[i]).powi(2)).sum();
+                let near = self.prepared.facet_near(link, q).is_some_and(|facet| {
+                    let d: f32 = (0..3).map(|i| (facet.x[i] - q[i]).powi(2)).sum();
                     d.sqrt() < OFF_SURFACE
                 });
                 off += usize::from(!near);

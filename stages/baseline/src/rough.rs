@@ -1,11 +1,11 @@
-//! Points that may be a base, and the base's model, in; out comes where it stands, by boxes in the
-//! plane and equal steps of yaw (the source, §3.2).
+//! Finds roughly where a base stands among points that may be its own, by boxes in the plane and
+//! equal steps of yaw (the source, §3.2).
 
 use geometry::{Plane, Point, Pose, Vector};
 use nalgebra::{Matrix2, Rotation3, Translation3, Unit, UnitQuaternion, Vector2};
 use std::f64::consts::{PI, TAU};
 
-use super::Paper;
+use crate::context::SequentialFit;
 
 /// Eigenvalues of a footprint nearer than this ratio: its axes mean nothing (METHOD.md §10).
 const SQUARE: f64 = 1.3;
@@ -18,12 +18,17 @@ const APART: f64 = 0.35;
 const OFF_AXIS: f64 = 0.35;
 
 /// Local from base: the best yaws, best first.
-pub(super) fn places(paper: &Paper<'_>, plane: &Plane, points: &[Vector], foot: f64) -> Vec<Pose> {
+pub(crate) fn places(
+    robot: &SequentialFit<'_>,
+    plane: &Plane,
+    points: &[Vector],
+    foot: f64,
+) -> Vec<Pose> {
     let n = plane.normal;
     let tilt = Rotation3::rotation_between(&Vector::z(), &n).unwrap_or_else(Rotation3::identity);
     let flat = |p: &Vector| (tilt.inverse() * p).xy();
     let prints = Footprint::of(points.iter().map(flat))
-        .zip(Footprint::of(paper.base_samples().iter().map(|p| p.xy())));
+        .zip(Footprint::of(robot.base_samples().iter().map(|p| p.xy())));
     let Some((seen, model)) = prints else { return Vec::new() };
     let pose = |yaw: f64| {
         let turn = Rotation3::from_axis_angle(&Unit::new_normalize(Vector::z()), yaw);
@@ -32,13 +37,13 @@ pub(super) fn places(paper: &Paper<'_>, plane: &Plane, points: &[Vector], foot: 
         let rotation = UnitQuaternion::from_rotation_matrix(&(tilt * turn));
         Pose::from_parts(Translation3::from(at), rotation)
     };
-    let cost = |yaw: f64| off(paper, &pose(yaw), points);
+    let cost = |yaw: f64| off(robot, &pose(yaw), points);
     let has_axes = seen.ratio > SQUARE && model.ratio > SQUARE;
     let on_axis = |yaw: f64| {
         let d = (yaw - (seen.yaw - model.yaw)).rem_euclid(PI);
         d.min(PI - d) < OFF_AXIS
     };
-    let n_yaw = (TAU / paper.settings.yaw_step[0]).round() as usize;
+    let n_yaw = (TAU / robot.settings.yaw_step[0]).round() as usize;
     let mut tried: Vec<(f64, f64)> = (0..n_yaw)
         .map(|k| TAU * k as f64 / n_yaw as f64)
         .filter(|yaw| !has_axes || on_axis(*yaw))
@@ -55,58 +60,35 @@ pub(super) fn places(paper: &Paper<'_>, plane: &Plane, points: &[Vector], foot: 
             kept.push(yaw);
         }
     }
-    let steps = (paper.settings.yaw_step[0] / paper.settings.yaw_step[1]).ceil() as i32;
+    let steps = (robot.settings.yaw_step[0] / robot.settings.yaw_step[1]).ceil() as i32;
     let finer = |yaw: f64| {
-        let fine = (-steps..=steps).map(|k| yaw + f64::from(k) * paper.settings.yaw_step[1]);
+        let fine = (-steps..=steps).map(|k| yaw + f64::from(k) * robot.settings.yaw_step[1]);
         fine.map(|yaw| (cost(yaw), yaw)).min_by(|a, b| a.0.total_cmp(&b.0))
     };
     kept.into_iter().filter_map(finer).map(|(_, yaw)| pose(yaw)).collect()
 }
 
 /// Mean distance of the points from the base's surface, each at most the truncation, metres.
-fn off(paper: &Paper<'_>, local_from_base: &Pose, points: &[Vector]) -> f64 {
-    let truncation = paper.settings.truncation;
-    let link_from_local = (local_from_base * paper.base_pose()).inverse();
+fn off(robot: &SequentialFit<'_>, local_from_base: &Pose, points: &[Vector]) -> f64 {
+    let truncation = robot.settings.truncation;
+    let link_from_local = (local_from_base * robot.base_pose()).inverse();
     let sum: f64 = points
         .iter()
         .map(|p| {
             let q = link_from_local * Point::from(*p);
-            paper
-                .closest(paper.base, &q)
+            robot
+                .closest(robot.base, &q)
                 .map_or(truncation, |(x, _)| (q - x).norm().min(truncation))
         })
         .sum();
     sum / points.len().max(1) as f64
 }
 
-impl Paper<'_> {
-    /// Root frame from the base link.
-    pub(super) fn base_pose(&self) -> Pose {
-        self.prepared.model.poses(&self.prepared.model.home())[self.base]
-    }
-
-    /// The closest point of a link's surface, and its normal, link frame; `None` beyond the field's
-    /// reach.
-    pub(super) fn closest(&self, link: usize, q: &Point) -> Option<(Point, Vector)> {
-        let p = [q.x as f32, q.y as f32, q.z as f32];
-        let fields = &self.prepared.links[link].fields;
-        let at = fields.fine.nearest(p).or_else(|| fields.coarse.nearest(p))?;
-        let (facet, cad) = (&fields.facets[at], &self.prepared.model.links[link].cad);
-        let (x, n) = (facet.x.map(f64::from), facet.n.map(f64::from));
-        let (x, n) = (Point::from(x), Vector::from(n));
-        // The facet goes on beside its sample, about as far as to the next one.
-        let beside = (q - x) - n * n.dot(&(q - x));
-        let reach = f64::from(cad.spacing);
-        let beside = if beside.norm() > reach { beside * (reach / beside.norm()) } else { beside };
-        Some((x + beside, n))
-    }
-}
-
 /// Box of points in a plane along their principal axes.
 struct Footprint {
     middle: Vector2<f64>,
     yaw: f64,
-    /// Of the larger to the smaller eigenvalue.
+    /// Ratio of the larger to the smaller eigenvalue.
     ratio: f64,
 }
 

@@ -1,14 +1,17 @@
-//! Views in; out come angular lattices of their points, on which the point nearest to any place is
-//! found by looking at a few pixels (the source, §4).
+//! Angular grids of the points of views, on which the measured point nearest to any place is found
+//! by looking at a few pixels (the source, §4).
 
 use contract::View;
 use geometry::{Point, Vector, direction};
 
-/// Lattices of all views with a known scanner.
-pub(crate) struct Lattices(Vec<Lattice>);
+/// Angular grids of all views with a known scanner.
+pub(crate) struct DirectionGrids(Vec<DirectionGrid>);
 
-struct Lattice {
+/// The points of one view by elevation (row) and azimuth (column).
+struct DirectionGrid {
+    /// Local frame.
     scanner: Point,
+    /// Edge of a pixel, radians.
     step: f64,
     /// First row and column.
     low: [i32; 2],
@@ -17,33 +20,33 @@ struct Lattice {
     cells: Vec<[f32; 3]>,
 }
 
-/// Pixels of a lattice at most: finer ones are coarsened.
+/// Pixels of a grid at most: finer ones are coarsened.
 const MAX_CELLS: usize = 1 << 24;
 /// Cosine below which a surface is not expected in the scan.
 const MIN_FACING: f64 = 0.15;
 
-impl Lattices {
-    pub(super) fn new(views: &[&View]) -> Self {
-        Self(views.iter().filter_map(|view| Lattice::new(view)).collect())
+impl DirectionGrids {
+    pub(crate) fn new(views: &[&View]) -> Self {
+        Self(views.iter().filter_map(|view| DirectionGrid::new(view)).collect())
     }
 
     /// Distance from a surface sample (local frame) to the nearest measured point in the windows of
     /// the scans that it faces, at most `cap`; `None` where it faces none.
-    pub(super) fn nearest(&self, p: &Point, n: &Vector, window: i32, cap: f64) -> Option<f64> {
+    pub(crate) fn nearest(&self, p: &Point, n: &Vector, window: i32, cap: f64) -> Option<f64> {
         let mut best: Option<f64> = None;
-        for lattice in &self.0 {
-            let ray = lattice.scanner - p;
+        for grid in &self.0 {
+            let ray = grid.scanner - p;
             if n.dot(&ray) < MIN_FACING * ray.norm() {
                 continue;
             }
-            let found = lattice.nearest(p, window).unwrap_or(cap).min(cap);
+            let found = grid.nearest(p, window).unwrap_or(cap).min(cap);
             best = Some(best.map_or(found, |b| b.min(found)));
         }
         best
     }
 }
 
-impl Lattice {
+impl DirectionGrid {
     fn new(view: &View) -> Option<Self> {
         let scanner = view.scanner?;
         if view.points.is_empty() || view.beam_step <= 0.0 {
@@ -104,7 +107,7 @@ impl Lattice {
 }
 
 /// Elevation and azimuth from the scanner, radians. A region that straddles ±180° makes a wide
-/// lattice, no wrong one.
+/// grid, no wrong one.
 fn angles(scanner: &Point, p: &Point) -> [f64; 2] {
     let d = p - scanner;
     let (azimuth, elevation, _) = direction::spherical([d.x as f32, d.y as f32, d.z as f32]);

@@ -1,35 +1,41 @@
-//! A region's points, the planes under it and a model in; the fit of the method's source out, link
-//! after link, as it is described there (§§3–6): the baseline that the other method is measured
-//! against.
+//! The method that the fit started from, as its source describes it (§§3–6): link after link, the
+//! baseline that the stage `fit` is measured against. It is chosen by `--method paper` and is not
+//! meant for use.
 //!
-//! Installation plane, geodesic candidates of the base (`graph`), boxes and equal steps of yaw
-//! (`rough`), sparse ICP (`sparse`), then for each joint a sweep with nearest neighbours on the
-//! angular lattices (`lattice`, `sweep`) and the registration of its link tied to two points of the
-//! joint's axis, Eq. 4.1 (`axis`). Links of sub chains follow by the model's own inverse kinematics
-//! of loops. No free space, no joint adjustment.
+//! On an installation plane, candidates of the base are found by distances along surfaces
+//! (`graph`), placed by boxes and equal steps of yaw (`rough`), and registered by sparse ICP
+//! (`sparse`). Then each joint is swept with nearest neighbours on angular grids of the scans
+//! (`direction_grid`, `sweep`), and its links are registered, tied to two points of the joint's
+//! axis, Eq. 4.1 (`axis`). Links of closed loops follow by the model's own inverse kinematics. The
+//! method uses no free space and adjusts no joints together; beams only decide whether a finished
+//! fit is kept ([`fit::report_estimate`]).
+//!
+//! Lengths are metres, angles radians. Method and maths: METHOD.md §10 of the stage `fit`.
+#![forbid(unsafe_code)]
 
 mod axis;
+mod context;
+mod direction_grid;
 mod graph;
-mod lattice;
+mod posture;
 mod rough;
 mod settings;
 mod sparse;
 mod sweep;
 
-use contract::{Fit, InstallationPlane, JointFit};
+use contract::{Certainty, Fit, InstallationPlane};
+use fit::verdict::{self, VerdictEvent};
+use fit::{MeasuredScene, PostureEstimate, Prepared};
 use geometry::{Plane, Point, Pose, Vector};
-use nalgebra::{Translation3, UnitQuaternion};
 
-pub use settings::Settings as PaperSettings;
+pub use settings::Settings;
 
-use crate::judge::{evidence, judge};
-use crate::state::Hypothesis;
-use crate::verdict::{self, VerdictEvent};
-use crate::{Prepared, Scene, Settings};
-use lattice::Lattices;
+use context::SequentialFit;
+use direction_grid::DirectionGrids;
+use posture::Placement;
 
-/// Stated for each joint: the source's own worst joint (Table 1), since the method gives no
-/// uncertainty.
+/// Standard deviation that is stated for each joint, radians: the source's own worst joint
+/// (Table 1), since the method gives no uncertainty.
 const SIGMA: f64 = 0.0094;
 /// Steps to each side when a base is settled.
 const N_SETTLE: i32 = 10;
@@ -38,27 +44,19 @@ const GOOD_SCORE: f64 = 0.5;
 /// Tolerance of the judgement, metres.
 const JUDGE_TOLERANCE: f64 = 0.015;
 
-/// One model in one scene.
-pub(crate) struct Paper<'a> {
-    pub(crate) prepared: &'a Prepared<'a>,
-    pub(crate) scene: &'a Scene<'a>,
-    pub(crate) settings: &'a PaperSettings,
-    pub(crate) lattices: &'a Lattices,
-    /// The link that stands on the plane.
-    pub(crate) base: usize,
-}
-
-/// The fits of a model on each plane that carries something like its base, best first.
+/// The fits of a model on each plane (world frame) that carries something like its base, the one
+/// that explains most surface first. `judging` says which fits are reported at all.
 #[must_use]
 pub fn fit(
     prepared: &Prepared<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     planes: &[InstallationPlane],
-    (settings, own): (&Settings, &PaperSettings),
+    judging: &fit::Settings,
+    settings: &Settings,
 ) -> Vec<Fit> {
     let Some(&base) = prepared.fixed.first() else { return Vec::new() };
-    let lattices = Lattices::new(&scene.views);
-    let paper = Paper { prepared, scene, settings: own, lattices: &lattices, base };
+    let grids = DirectionGrids::new(&scene.views);
+    let robot = SequentialFit { prepared, scene, settings, grids: &grids, base };
     let mut out: Vec<Fit> = Vec::new();
     let mut planes: Vec<&InstallationPlane> = planes.iter().collect();
     planes.sort_by(|a, b| a.plane.offset.total_cmp(&b.plane.offset));
@@ -71,25 +69,24 @@ pub fn fit(
             normal: plane.plane.normal,
             offset: plane.plane.offset - plane.plane.normal.dot(&scene.region.origin.coords),
         };
-        for pose in paper.bases(&local) {
-            let (rough, precise) = paper.posture(&pose);
-            out.extend(paper.report(&pose, rough, precise, settings));
+        for pose in robot.bases(&local) {
+            let (rough, precise) = robot.posture(&pose);
+            out.extend(robot.report(&pose, rough, precise, judging));
         }
     }
     out.sort_by(|a, b| b.explained.total_cmp(&a.explained));
     out
 }
 
-impl Paper<'_> {
+impl SequentialFit<'_> {
     /// Poses of the base on a plane: one for each connected set of points that is as near to the
     /// plane, along the surface, as the base is high.
     fn bases(&self, plane: &Plane) -> Vec<Pose> {
         let s = self.settings;
         let points: Vec<Vector> = self
             .scene
-            .thin
-            .iter()
-            .map(|&i| Vector::from(self.scene.points[i as usize].p.map(f64::from)))
+            .thinned_local_points()
+            .map(|p| p.coords)
             .filter(|p| (s.foot_low..s.max_height).contains(&plane.distance(p)))
             .collect();
         let cad = self.base_samples();
@@ -142,8 +139,7 @@ impl Paper<'_> {
 
     /// Joint after joint: the value of the sweep, then that of the registration.
     fn posture(&self, base: &Pose) -> (Vec<f64>, Vec<f64>) {
-        let mut h =
-            Hypothesis { local_from_base: *base, posture: self.prepared.model.home(), score: 0.0 };
+        let mut h = Placement { local_from_base: *base, posture: self.prepared.model.home() };
         let mut rough = h.posture.clone();
         for joint in 0..h.posture.len() {
             if self.prepared.placed_by[joint].is_empty() {
@@ -156,42 +152,25 @@ impl Paper<'_> {
         (rough, h.posture)
     }
 
+    /// The fit that is reported; `None` where the beams contradict it. All joints have the standard
+    /// deviation that the source states, and count as undetermined: the method does not ask which
+    /// of them the points determine.
     fn report(
         &self,
         base: &Pose,
         rough: Vec<f64>,
         posture: Vec<f64>,
-        settings: &Settings,
+        judging: &fit::Settings,
     ) -> Option<Fit> {
-        let model = self.prepared.model;
-        let h = Hypothesis { local_from_base: *base, posture, score: 0.0 };
-        let judgement = judge(self.prepared, self.scene, settings, &h, JUDGE_TOLERANCE);
-        if judgement.score < settings.min_score || judgement.violation > settings.max_violation {
-            return None;
+        let (local_from_base, tolerance) = (*base, JUDGE_TOLERANCE);
+        let estimate = PostureEstimate { local_from_base, posture, tolerance };
+        let mut fit = fit::report_estimate(self.prepared, self.scene, judging, &estimate)?;
+        fit.base_sigma = [SIGMA; 6];
+        for joint in &mut fit.joints {
+            joint.sigma = SIGMA;
+            joint.certainty = Certainty::Undetermined;
         }
-        let joints = h.posture.iter().enumerate().map(|(j, value)| JointFit {
-            name: model.joints[model.free[j]].name.clone(),
-            value: *value,
-            sigma: SIGMA,
-            // It does not ask.
-            certainty: contract::Certainty::Undetermined,
-            ..JointFit::default()
-        });
-        let none = vec![0; model.links.len()];
-        let rms = vec![0.0; model.links.len()];
-        let origin = Translation3::from(self.scene.region.origin.coords);
-        let mut fit = Fit {
-            model: self.prepared.index,
-            model_name: model.name.clone(),
-            world_from_base: Pose::from_parts(origin, UnitQuaternion::identity()) * base,
-            base_sigma: [SIGMA; 6],
-            joints: joints.collect(),
-            score: judgement.score,
-            explained: judgement.explained,
-            links: evidence(self.prepared, &judgement, &none, &rms),
-            rough,
-            ..Fit::default()
-        };
+        fit.rough = rough;
         verdict::apply(&mut fit, &VerdictEvent::LinkAfterLink);
         Some(fit)
     }

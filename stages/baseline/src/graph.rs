@@ -1,16 +1,16 @@
-//! Points and their heights over a plane in; out come those near the plane along the surface, by
-//! Dijkstra's algorithm on the graph of nearest neighbours (the source, §3.1; METHOD.md §10).
+//! Finds the points that are near a plane along the surface they lie on, by Dijkstra's algorithm on
+//! the graph of nearest neighbours (the source, §3.1; METHOD.md §10).
 
 use geometry::Vector;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use super::PaperSettings;
+use crate::settings::Settings;
 
 /// Largest distance from the plane along the surface of a body that stands on it, metres.
-pub(super) fn farthest(
+pub(crate) fn farthest(
     points: &[Vector],
-    settings: &PaperSettings,
+    settings: &Settings,
     height: impl Fn(&Vector) -> f64,
 ) -> f64 {
     distances(points, settings, height).into_iter().filter(|d| d.is_finite()).fold(0.0, f64::max)
@@ -18,9 +18,9 @@ pub(super) fn farthest(
 
 /// Connected sets of the points whose distance from the plane along the surface is at most `limit`,
 /// largest first.
-pub(super) fn near_plane(
+pub(crate) fn near_plane(
     points: &[Vector],
-    settings: &PaperSettings,
+    settings: &Settings,
     height: impl Fn(&Vector) -> f64,
     limit: f64,
 ) -> Vec<Vec<usize>> {
@@ -56,11 +56,7 @@ const MIN_POINTS: usize = 100;
 
 /// Distance of each point from the plane along the graph, metres; infinite where no way leads
 /// there.
-fn distances(
-    points: &[Vector],
-    settings: &PaperSettings,
-    height: impl Fn(&Vector) -> f64,
-) -> Vec<f64> {
+fn distances(points: &[Vector], settings: &Settings, height: impl Fn(&Vector) -> f64) -> Vec<f64> {
     let edges = neighbours(points, settings);
     let mut distance = vec![f64::INFINITY; points.len()];
     let mut open = BinaryHeap::new();
@@ -85,7 +81,7 @@ fn distances(
 }
 
 /// The nearest neighbours of each point within the longest edge, with their distances; both ways.
-fn neighbours(points: &[Vector], settings: &PaperSettings) -> Vec<Vec<(usize, f64)>> {
+fn neighbours(points: &[Vector], settings: &Settings) -> Vec<Vec<(usize, f64)>> {
     let cell = |p: &Vector| [p.x, p.y, p.z].map(|v| (v / settings.max_edge).floor() as i64);
     let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     for (i, p) in points.iter().enumerate() {
@@ -148,7 +144,7 @@ mod tests {
                 points.push(Vector::new(f64::from(i) * 0.012, f64::from(j) * 0.012, 0.3));
             }
         }
-        let far = farthest(&points, &PaperSettings::default(), |p| p.z);
+        let far = farthest(&points, &Settings::default(), |p| p.z);
         // 0.5 m, less what edges of the graph cut off the corners.
         assert!((0.47..0.53).contains(&far), "{far}");
     }

@@ -1,4 +1,4 @@
-//! Angles in; the same without whole turns, or within a joint's limits, out.
+//! Angles that are the same after whole turns: differences of two, and the one within limits.
 
 use std::f64::consts::TAU;
 
@@ -9,14 +9,16 @@ pub fn from_to(a: f64, b: f64) -> f64 {
     d - TAU * (d / TAU).round()
 }
 
-/// Size of that, radians.
+/// Size of the turn from one angle to another, radians, 0..π.
 #[must_use]
 pub fn apart(a: f64, b: f64) -> f64 {
     from_to(a, b).abs()
 }
 
-/// The same angle within limits: the nearest that is; `None` where none is.
-pub(crate) fn within(value: f64, [low, high]: [f64; 2]) -> Option<f64> {
+/// The same angle within limits (lower, upper), radians: the nearest one, whole turns away;
+/// `None` where there is none.
+#[must_use]
+pub fn within(value: f64, [low, high]: [f64; 2]) -> Option<f64> {
     let turned = match value {
         _ if value < low => low + (value - low).rem_euclid(TAU),
         _ if value > high => high - (high - value).rem_euclid(TAU),

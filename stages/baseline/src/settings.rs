@@ -1,4 +1,4 @@
-//! What is tuned in the source's method, with unit and reason.
+//! What is tuned in the source's method (METHOD.md §10 of `fit`), with units.
 
 /// Tunables of `--method paper`.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,7 +9,7 @@ pub struct Settings {
     pub n_neighbours: usize,
     /// Longest edge of the graph, metres.
     pub max_edge: f64,
-    /// Points so high above the plane are where paths begin, metres.
+    /// Lower end of the band above the plane where paths begin, metres.
     pub foot_low: f64,
     /// Upper end of that band, metres.
     pub foot_high: f64,

@@ -1,5 +1,5 @@
-//! Fits of all candidates in; out come those that can stand together: at most one for each body of
-//! points.
+//! Chooses, among the fits of all candidates, those that can stand together: at most one for each
+//! body of points (METHOD.md §16).
 
 use contract::{Fit, RunnerUp, Verdict};
 use geometry::{Aabb, Point};
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn arms_that_cross_are_two_robots_though_both_are_doubtful() {
-        let models = [crate::cubes::bar(), crate::cubes::bar()];
+        let models = [crate::problem::bar(), crate::problem::bar()];
         let fit = |model: usize, explained: f64, (x, turn, verdict): (f64, f64, Verdict)| Fit {
             model,
             verdict,

@@ -1,16 +1,24 @@
-//! A refined fit in; out comes what the beams say of each of its links, and one score for the
-//! whole.
+//! What the beams say of a posture: of each of its links, and one score for the whole (METHOD.md
+//! §8.3).
 
 use contract::LinkEvidence;
 use geometry::{Point, Probe};
 
-use crate::problem::Problem;
+use super::context::Problem;
 use crate::state::Hypothesis;
-use crate::{Prepared, Scene, Settings};
+use crate::{MeasuredScene, Prepared, Settings};
 
-/// Bounds of the distance of a judged point, metres: what is left after a fit should be the scans'
-/// own noise, not the fit's.
-const TOLERANCE: (f64, f64) = (0.012, 0.04);
+/// How far a sample may be from what a beam met and still count as explained.
+struct JudgeTolerance {
+    /// In standard deviations of the scans' noise.
+    sigmas: f64,
+    /// Least, metres: what is left after a fit should be the scans' own noise, not the fit's.
+    least: f64,
+    /// Most, metres.
+    most: f64,
+}
+
+const TOLERANCE: JudgeTolerance = JudgeTolerance { sigmas: 4.0, least: 0.012, most: 0.04 };
 
 /// Judgement of a posture.
 #[derive(Debug, Clone)]
@@ -31,14 +39,14 @@ pub(crate) struct Judgement {
 
 /// The judgement with the tolerance that the scans' noise asks for.
 pub(crate) fn judged(problem: &Problem<'_>, h: &Hypothesis) -> Judgement {
-    let tolerance = (4.0 * problem.scene.noise).clamp(TOLERANCE.0, TOLERANCE.1);
+    let tolerance = (TOLERANCE.sigmas * problem.scene.noise).clamp(TOLERANCE.least, TOLERANCE.most);
     judge(problem.prepared, problem.scene, problem.settings, h, tolerance)
 }
 
 /// Judges a posture to within `tolerance` metres.
 pub(crate) fn judge(
     prepared: &Prepared<'_>,
-    scene: &Scene<'_>,
+    scene: &MeasuredScene<'_>,
     settings: &Settings,
     h: &Hypothesis,
     tolerance: f64,
@@ -86,6 +94,13 @@ pub(crate) fn judge(
     out
 }
 
+/// A posture, and what the beams say of it.
+#[derive(Clone, Copy)]
+pub(crate) struct JudgedPosture<'a> {
+    pub(crate) hypothesis: &'a Hypothesis,
+    pub(crate) judgement: &'a Judgement,
+}
+
 /// A link that moves less than this between two postures stands the same in both, metres: a beam's
 /// width and noise.
 const MOVED: f64 = 0.02;
@@ -94,12 +109,12 @@ const MOVED: f64 = 0.02;
 /// links that stand differently, about 0 for equals, 1 for right against nothing.
 pub(crate) fn margin(
     prepared: &Prepared<'_>,
-    best: (&Hypothesis, &Judgement),
-    other: (&Hypothesis, &Judgement),
+    best: JudgedPosture<'_>,
+    other: JudgedPosture<'_>,
 ) -> f64 {
     let (mut ahead, mut judged) = (0.0, 0.0);
-    for l in moved([prepared; 2], [best.0, other.0]) {
-        let (p, q) = (best.1.links[l], other.1.links[l]);
+    for l in links_apart([prepared; 2], [best.hypothesis, other.hypothesis]) {
+        let (p, q) = (best.judgement.links[l], other.judgement.links[l]);
         ahead += p[0] - q[0];
         judged += p[1].max(q[1]);
     }
@@ -107,7 +122,7 @@ pub(crate) fn margin(
 }
 
 /// Links that stand differently in two postures of two models of one robot.
-pub(crate) fn moved(prepared: [&Prepared<'_>; 2], [a, b]: [&Hypothesis; 2]) -> Vec<usize> {
+pub(crate) fn links_apart(prepared: [&Prepared<'_>; 2], [a, b]: [&Hypothesis; 2]) -> Vec<usize> {
     let pose = |prepared: &Prepared<'_>, h: &Hypothesis| {
         let poses = prepared.model.poses(&h.posture);
         poses.iter().map(|p| h.local_from_base * p).collect::<Vec<_>>()
@@ -122,7 +137,7 @@ pub(crate) fn moved(prepared: [&Prepared<'_>; 2], [a, b]: [&Hypothesis; 2]) -> V
 }
 
 /// What is reported of each link.
-pub(crate) fn evidence(
+pub(crate) fn link_evidence(
     prepared: &Prepared<'_>,
     judgement: &Judgement,
     n_points: &[usize],

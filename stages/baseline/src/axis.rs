@@ -1,12 +1,12 @@
-//! A posture with a joint's rough value in; its value by registration of the joint's links, tied to
-//! two points of the joint's axis, out (the source, Eq. 4.1; METHOD.md §10).
+//! Registers the links of one joint with the measured points, tied to two points of the joint's
+//! axis: from the joint's rough value to its precise one (the source, Eq. 4.1; METHOD.md §10).
 
 use geometry::{Point, Pose, Vector, robust};
 use robot::JointKind;
 
-use super::Paper;
-use super::sparse::rigid;
-use crate::state::Hypothesis;
+use crate::context::SequentialFit;
+use crate::posture::Placement;
+use crate::sparse::rigid;
 
 /// Most points of a registration.
 const MAX_POINTS: usize = 12_000;
@@ -23,17 +23,33 @@ const MAX_STRETCH: f64 = 12.0;
 const MIN_FACING: f64 = 0.15;
 
 /// A measured point that may lie on the joint's links.
-struct Near {
+struct NearbyPoint {
+    /// Local frame.
     at: Point,
-    /// Its scanner, where that is known.
+    /// Scanner that measured it, local frame; `None` where unknown.
     scanner: Option<Point>,
     /// Distance from the link that carries the joint, metres.
     parent: f64,
 }
 
-impl Paper<'_> {
+/// What a joint's links are registered with.
+#[derive(Clone, Copy)]
+struct RegisteredPoints<'a> {
+    points: &'a [NearbyPoint],
+    /// Farther points do not belong to the links, metres.
+    gate: f64,
+}
+
+/// Two points of a joint's axis, which a registration keeps where they are.
+struct AxisEnds {
+    ends: [Vector; 2],
+    /// Weight of each end, as a multiple of the weight of all correspondences together.
+    weight: f64,
+}
+
+impl SequentialFit<'_> {
     /// The joint's value after registration.
-    pub(super) fn register(&self, h: &Hypothesis, joint: usize) -> f64 {
+    pub(crate) fn register(&self, h: &Placement, joint: usize) -> f64 {
         let s = self.settings;
         let [low, high] = self.prepared.model.limits(joint);
         let near = self.near(h, joint);
@@ -42,7 +58,8 @@ impl Paper<'_> {
         for round in 0..s.n_rounds {
             let share = round as f64 / (s.n_rounds / 2).max(1) as f64;
             let gate = (s.gate[0] * (1.0 - share)).max(s.gate[1]);
-            let Some(step) = self.step(&trial, joint, (&near, gate)) else { break };
+            let near = RegisteredPoints { points: &near, gate };
+            let Some(step) = self.step(&trial, joint, near) else { break };
             // Steps of a creeping iteration shrink by one ratio: their sum is known (Aitken).
             let ratio = before.map_or(0.0, |b| step / b);
             let creeps = (0.2..1.0).contains(&ratio);
@@ -58,7 +75,7 @@ impl Paper<'_> {
     }
 
     /// How much further the joint turns (or slides) by one solution of Eq. 4.1.
-    fn step(&self, h: &Hypothesis, joint: usize, near: (&[Near], f64)) -> Option<f64> {
+    fn step(&self, h: &Placement, joint: usize, near: RegisteredPoints<'_>) -> Option<f64> {
         let model = self.prepared.model;
         let index = model.free[joint];
         let poses = model.poses(&h.posture);
@@ -75,24 +92,25 @@ impl Paper<'_> {
         }
         let ends = frame.translation.vector;
         let half = axis * (0.5 * self.settings.axis_span);
-        Some(about_axis(&from, &to, ([ends - half, ends + half], self.settings.axis_weight)))
+        let weight = self.settings.axis_weight;
+        Some(about_axis(&from, &to, AxisEnds { ends: [ends - half, ends + half], weight }))
     }
 
     /// Closest points of the joint's links, and the measured points that they belong to, local
     /// frame; the farther half of a skewed lot is left out.
     fn pairs(
         &self,
-        h: &Hypothesis,
+        h: &Placement,
         joint: usize,
         poses: &[Pose],
-        (near, gate): (&[Near], f64),
+        RegisteredPoints { points, gate }: RegisteredPoints<'_>,
     ) -> (Vec<Vector>, Vec<Vector>) {
         let mut found: Vec<(Vector, Vector, f64)> = Vec::new();
         for &link in &self.prepared.placed_by[joint] {
             let local_from_link = h.local_from_base * poses[link];
             let link_from_local = local_from_link.inverse();
             let bounds = self.prepared.model.links[link].bounds.grown(gate);
-            for m in near {
+            for m in points {
                 let in_link = link_from_local * m.at;
                 if !bounds.contains(in_link.coords.into()) {
                     continue;
@@ -118,7 +136,7 @@ impl Paper<'_> {
     }
 
     /// Measured points about the joint's links where they stand now, thinned.
-    fn near(&self, h: &Hypothesis, joint: usize) -> Vec<Near> {
+    fn near(&self, h: &Placement, joint: usize) -> Vec<NearbyPoint> {
         let model = self.prepared.model;
         let poses = model.poses(&h.posture);
         let reach = 2.0 * self.settings.gate[0];
@@ -128,32 +146,29 @@ impl Paper<'_> {
         });
         let places: Vec<_> = places.collect();
         let inside = |q: &Point| places.iter().any(|(t, b)| b.contains((t * q).coords.into()));
-        let all: Vec<(Point, u16)> = self
-            .scene
-            .points
-            .iter()
-            .map(|m| (Point::from(m.p.map(f64::from)), m.view))
-            .filter(|(q, _)| inside(q))
-            .collect();
+        let all: Vec<(Point, u16)> = self.scene.local_points().filter(|(q, _)| inside(q)).collect();
         let parent = model.joints[model.free[joint]].parent;
         let link_from_local = (h.local_from_base * poses[parent]).inverse();
         let distance = |q: &Point| {
             let at = link_from_local * q;
-            let known = self.prepared.links[parent].weight > 0.0;
+            let known = self.prepared.has_surface(parent);
             let found = if known { self.closest(parent, &at) } else { None };
             found.map_or(f64::INFINITY, |(x, _)| (at - x).norm())
         };
         let step = all.len().div_ceil(MAX_POINTS).max(1);
         let thin = all.into_iter().step_by(step);
-        thin.map(|(at, view)| Near { at, scanner: self.scene.scanner(view), parent: distance(&at) })
-            .collect()
+        thin.map(|(at, view)| NearbyPoint {
+            at,
+            scanner: self.scene.scanner(view),
+            parent: distance(&at),
+        })
+        .collect()
     }
 }
 
-/// Eq. 4.1 in closed form: the turn about an axis that best brings points onto others, by the rigid
-/// motion that also keeps two points of the axis, of so much weight against all others together,
-/// and its twist about that axis. Radians.
-fn about_axis(from: &[Vector], to: &[Vector], (ends, weight): ([Vector; 2], f64)) -> f64 {
+/// Eq. 4.1 in closed form: the turn about an axis that best brings points onto others, radians. It
+/// is the twist about that axis of the rigid motion that also keeps two points of the axis.
+fn about_axis(from: &[Vector], to: &[Vector], AxisEnds { ends, weight }: AxisEnds) -> f64 {
     let each = weight * from.len() as f64;
     let (mut a, mut b, mut weights) = (from.to_vec(), to.to_vec(), vec![1.0; from.len()]);
     for end in ends {
@@ -190,12 +205,12 @@ mod tests {
         let to: Vec<Vector> = from.iter().map(|p| origin + turn * (p - origin)).collect();
         let ends = [origin - axis.into_inner() * 0.25, origin + axis.into_inner() * 0.25];
         for weight in [0.01, 0.5, 50.0] {
-            let found = about_axis(&from, &to, (ends, weight));
+            let found = about_axis(&from, &to, AxisEnds { ends, weight });
             assert!((found - 0.0345).abs() < 1e-9, "{found} at weight {weight}");
         }
         // Points that are off along the axis do not turn it when the axis weighs enough.
         let off: Vec<Vector> = to.iter().map(|p| p + axis.into_inner() * 0.004).collect();
-        let found = about_axis(&from, &off, (ends, 50.0));
+        let found = about_axis(&from, &off, AxisEnds { ends, weight: 50.0 });
         assert!((found - 0.0345).abs() < 1e-4, "{found}");
     }
 }

@@ -1,11 +1,11 @@
-//! Candidate points and a rough pose of the base in; the pose by sparse iterative closest points
-//! out: an ℓp norm, p < 1, minimised by alternating directions with multipliers (the source, §3.2;
-//! METHOD.md §10).
+//! Registers a base with the points that may be its own, from a rough pose on, by sparse iterative
+//! closest points: an ℓp norm, p < 1, minimised by alternating directions with multipliers (the
+//! source, §3.2; METHOD.md §10).
 
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
-use super::Paper;
+use crate::context::SequentialFit;
 
 /// Most points that take part.
 const MAX_POINTS: usize = 2500;
@@ -17,16 +17,18 @@ const MAX_MU: f64 = 1e5;
 const N_SHRINK: usize = 3;
 
 /// Local from base after registration, six degrees of freedom.
-pub(super) fn register(paper: &Paper<'_>, start: &Pose, points: &[Vector]) -> Pose {
-    let s = paper.settings;
+pub(crate) fn register(robot: &SequentialFit<'_>, start: &Pose, points: &[Vector]) -> Pose {
+    let s = robot.settings;
     let step = points.len().div_ceil(MAX_POINTS).max(1);
-    let base = paper.base_pose();
+    let base = robot.base_pose();
     let mut local_from_base = *start;
     let cloud: Vec<Vector> = points.iter().step_by(step).copied().collect();
     let size = {
         let mean = cloud.iter().sum::<Vector>() / cloud.len().max(1) as f64;
         cloud.iter().map(|p| (p - mean).norm()).fold(1e-3, f64::max)
     };
+    let [mu, growth] = s.sparse_mu;
+    let norm = SparseNorm { p: s.sparse_p, mu, growth, rounds: s.sparse_rounds[1] };
     let mut multipliers = vec![Vector::zeros(); cloud.len()];
     for _ in 0..s.sparse_rounds[0] {
         let link_from_local = (local_from_base * base).inverse();
@@ -36,7 +38,7 @@ pub(super) fn register(paper: &Paper<'_>, start: &Pose, points: &[Vector]) -> Po
         let mut c: Vec<Vector> = Vec::with_capacity(cloud.len());
         for (p, multiplier) in cloud.iter().zip(&multipliers) {
             let at = link_from_local * Point::from(*p);
-            let Some((closest, _)) = paper.closest(paper.base, &at) else { continue };
+            let Some((closest, _)) = robot.closest(robot.base, &at) else { continue };
             x.push(at.coords / size);
             q.push(closest.coords / size);
             c.push(*multiplier);
@@ -44,7 +46,7 @@ pub(super) fn register(paper: &Paper<'_>, start: &Pose, points: &[Vector]) -> Po
         if x.len() < 10 {
             break;
         }
-        let moved = align(&x, &q, &mut c, s.sparse_p, (s.sparse_mu, s.sparse_rounds[1]));
+        let moved = align(&x, &q, &mut c, &norm);
         let shift = Translation3::from(moved.translation.vector * size);
         let motion = Pose::from_parts(shift, moved.rotation);
         // The points move by `motion` in the link's frame: the link moves the other way.
@@ -58,15 +60,20 @@ pub(super) fn register(paper: &Paper<'_>, start: &Pose, points: &[Vector]) -> Po
     local_from_base
 }
 
-/// The motion of `x` that brings it onto `q` in the sparse norm.
-fn align(
-    x: &[Vector],
-    q: &[Vector],
-    c: &mut [Vector],
+/// The sparse norm, and how it is minimised.
+struct SparseNorm {
+    /// Exponent, 0..1.
     p: f64,
-    ([mu, growth], rounds): ([f64; 2], usize),
-) -> Pose {
-    let mut mu = mu;
+    /// First penalty of the multipliers (unit size), and the factor that it grows by in a round.
+    mu: f64,
+    growth: f64,
+    /// Most rounds.
+    rounds: usize,
+}
+
+/// The motion of `x` that brings it onto `q` in the sparse norm; `c` are the multipliers.
+fn align(x: &[Vector], q: &[Vector], c: &mut [Vector], norm: &SparseNorm) -> Pose {
+    let &SparseNorm { p, mut mu, growth, rounds } = norm;
     let mut motion = Pose::identity();
     let mut now: Vec<Vector> = x.to_vec();
     let mut z = vec![Vector::zeros(); x.len()];
@@ -111,7 +118,7 @@ fn shrink(h: Vector, p: f64, mu: f64) -> Vector {
 }
 
 /// The rigid motion that brings weighted points onto others, in closed form.
-pub(super) fn rigid(from: &[Vector], to: &[Vector], weights: &[f64]) -> Pose {
+pub(crate) fn rigid(from: &[Vector], to: &[Vector], weights: &[f64]) -> Pose {
     let total: f64 = weights.iter().sum();
     let mean = |v: &[Vector]| {
         v.iter().zip(weights).map(|(p, w)| p * *w).sum::<Vector>() / total.max(1e-300)
@@ -158,7 +165,8 @@ mod tests {
             })
             .collect();
         let mut c = vec![Vector::zeros(); x.len()];
-        let found = align(&x, &q, &mut c, 0.4, ([10.0, 1.2], 100));
+        let found =
+            align(&x, &q, &mut c, &SparseNorm { p: 0.4, mu: 10.0, growth: 1.2, rounds: 100 });
         let off = found.inverse() * truth;
         assert!(off.translation.vector.norm() < 1e-3, "{off}");
         assert!(off.rotation.angle() < 1e-3, "{off}");
