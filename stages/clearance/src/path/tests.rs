@@ -102,7 +102,7 @@ fn contacts_as_found_are_listed_separately_until_they_come_nearer() {
 #[test]
 fn what_was_hardly_beyond_the_margin_is_as_found_a_little_beside_the_posture_that_was_found() {
     for k in 0..60 {
-        let points = [([0.9, 0.075 + 0.0002 * f64::from(k), 0.0], What::Fixed)];
+        let points = [([0.9, 0.075 + 0.0002 * f64::from(k), 0.0], ObstacleKind::Fixed)];
         let found = walk(&points, &[0.001], 0.0, 0.02);
         assert!(found.iter().all(|c| c.as_found), "{found:?}");
     }
@@ -134,11 +134,11 @@ fn a_link_above_the_floor_is_not_in_it_where_a_bin_reaches_from_the_floor_into_t
     // The floor 28 mm below the beam, and a point in the beam: the middle of their bin is in it.
     let floor = (0..100_u32)
         .map(|k| [0.33 + 0.01 * f64::from(k % 10), 0.17 + 0.01 * f64::from(k / 10), -0.078])
-        .map(|p| (p, What::Floor));
-    let above = ([0.4, 0.25, -0.002], What::Fixed);
+        .map(|p| (p, ObstacleKind::Floor));
+    let above = ([0.4, 0.25, -0.002], ObstacleKind::Fixed);
     let points: Vec<_> = floor.chain([above]).collect();
     let found = walk(&points, &[0.0, 1.0], 0.0, 0.01);
-    assert!(found.iter().all(|c| c.what != What::Floor), "{found:?}");
+    assert!(found.iter().all(|c| c.what != ObstacleKind::Floor), "{found:?}");
 }
 
 #[test]
