@@ -1,5 +1,5 @@
-//! The engine: steps in, threads, order, memory bounds, errors and cancellation around them. Knows
-//! no geometry.
+//! The engine runs the steps of a pass on threads, keeps the order of items, bounds memory, and
+//! handles errors, panics and cancellation. It knows nothing of geometry or files.
 //!
 //! | promise | how |
 //! | --- | --- |
