@@ -44,7 +44,9 @@ impl Cancel {
             }
             flag.set();
         })
-        .map_err(|e| Error::new(Kind::Io, "the handler for Ctrl-C could not be installed").because(e))
+        .map_err(|e| {
+            Error::new(Kind::Io, "the handler for Ctrl-C could not be installed").because(e)
+        })
     }
 
     pub(super) fn error() -> Error {

@@ -40,7 +40,9 @@ pub(crate) fn copy_as_new(
 ) -> Result<()> {
     let usage = |what: &str| Error::new(Kind::Usage, what).at(to.display());
     if to.symlink_metadata().is_ok() {
-        return Err(usage("the folder exists already").hint("name a folder that does not exist yet"));
+        return Err(
+            usage("the folder exists already").hint("name a folder that does not exist yet")
+        );
     }
     let name = to.file_name().ok_or_else(|| usage("this path has no folder name at its end"))?;
     let parent = to.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -49,7 +51,8 @@ pub(crate) fn copy_as_new(
     let source = from.canonicalize().map_err(|e| at(from, e))?;
     let above = parent.ancestors().find_map(|p| p.canonicalize().ok());
     if above.is_some_and(|above| above.starts_with(&source)) {
-        return Err(usage("the folder lies in the folder that is to be copied").hint("name a folder outside of it"));
+        return Err(usage("the folder lies in the folder that is to be copied")
+            .hint("name a folder outside of it"));
     }
     let mut part = name.to_os_string();
     part.push(PART);

@@ -12,7 +12,8 @@ use std::ops::Range;
 /// Length of a leaf of the tree, bytes.
 const LEAF: u64 = CHUNK_LEN as u64;
 
-/// A subtree: its offset and length in the file, bytes, and its chaining value.
+/// A subtree of consecutive leaves: its offset and length in the file, bytes, and its chaining
+/// value.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Subtree {
     start: u64,

@@ -111,7 +111,10 @@ impl<'a> Map for Load<'a> {
             (InputPiece::Extent(extent), _) if !is_asked(&extent) => return Ok(Loaded::Nothing),
             (InputPiece::Extent(extent), Some(file)) => (extent, file),
             (InputPiece::Extent(_), None) => {
-                return Err(Error::new(Kind::Bug, "an input that is read in pieces has no open file"));
+                return Err(Error::new(
+                    Kind::Bug,
+                    "an input that is read in pieces has no open file",
+                ));
             }
         };
         let start = extent.bytes.start;

@@ -70,7 +70,9 @@ impl Job {
             names.into_iter().any(|name| first == name) || inside.as_os_str().is_empty()
         };
         if first.as_ref().is_none_or(is_ours) {
-            let what = format!("this path is an input and would be overwritten by the result in {}", self.out.display());
+            let out = self.out.display();
+            let what =
+                format!("this path is an input and would be overwritten by the result in {out}");
             return Err(usage(&what, named).hint("give another --out, or move the input"));
         }
         Ok(())

@@ -147,8 +147,8 @@ pub(super) fn digest(entries: &[TileEntry]) -> String {
 /// Reads and checks a catalogue whose scans are numbered from `first`; returns the entries and the
 /// length of the tile file.
 pub(super) fn read(path: &Path, first: u32) -> Result<(Vec<TileEntry>, u64)> {
-    let bytes =
-        std::fs::read(path).map_err(|e| Error::of_read("the catalogue of the store cannot be read", path, e))?;
+    let bytes = std::fs::read(path)
+        .map_err(|e| Error::of_read("the catalogue of the store cannot be read", path, e))?;
     let (mut entries, n) = parse(&bytes).map_err(|e| e.at(path.display()))?;
     for entry in &mut entries {
         let Some(scan) = entry.at.scan.0.checked_add(first) else {

@@ -49,7 +49,8 @@ impl Store {
         let map = FileMap::open(&path, resident_bytes)?;
         let bytes = map.bytes();
         if bytes.len() as u64 != n_tile_bytes || !bytes.starts_with(&catalogue::tiles_header()) {
-            return Err(broken("the tile file does not belong to the catalogue beside it").at(path.display()));
+            return Err(broken("the tile file does not belong to the catalogue beside it")
+                .at(path.display()));
         }
         let file = File::open(&path);
         let file = file.map_err(|e| Error::of_read("the tiles cannot be opened", &path, e))?;

@@ -62,7 +62,11 @@ impl TileSink {
         // for new ones.
         match std::fs::remove_file(dir.join(CATALOGUE)) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                return Err(Error::of_file("the catalogue of an earlier store cannot be removed", dir, e));
+                return Err(Error::of_file(
+                    "the catalogue of an earlier store cannot be removed",
+                    dir,
+                    e,
+                ));
             }
             _ => {}
         }
