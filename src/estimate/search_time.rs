@@ -1,4 +1,4 @@
-//! What seems to stand in a plant and the number of models in; processor time of the search out.
+//! Predicts the processor time of the search from the expected regions and the number of models.
 
 use super::expected_regions::{ExpectedRegion, ExpectedRegions};
 use super::rates::{AREA, REGION, SURFACE};
