@@ -1,4 +1,4 @@
-//! Commands and flags of `bench`, as `clap` knows them.
+//! Commands and flags of `bench`, as `clap` parses them.
 
 use crate::eval::bench::request::RescanSuite;
 use crate::eval::bench::throughput::Scanned;

@@ -1,5 +1,5 @@
-//! Commands and flags, as `clap` knows them. Their names are fixed: people and scripts rely on
-//! them.
+//! Commands and flags, as `clap` parses them. Their names are stable, since people and scripts rely
+//! on them.
 
 use super::bench_flags::BenchCommand;
 use super::say::LogFormat;

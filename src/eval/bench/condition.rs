@@ -1,10 +1,11 @@
-//! Names of suites and a seed in; cases, each with everything that its drawing needs, out.
+//! Conditions of the suites: how the cells of each suite are drawn and scanned, and the list of
+//! cases for a seed.
 
 use super::request::{DrawnCases, check_suites};
 use contract::Result;
 use robot::Model;
 
-/// What a robot is bolted to.
+/// Mount of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mounting {
     /// The floor, or a stand on it.
@@ -19,23 +20,22 @@ pub(super) enum Mounting {
     Tilted,
 }
 
-/// How the robot of a case is found: as the product does, or as a baseline that it is measured
-/// against.
+/// Method with which a case is solved: that of the product, or a baseline for comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
-    /// As the product does.
+    /// The method of the product.
     Whole,
-    /// Link after link, as the method's source does.
+    /// The link-by-link sweep of the paper.
     Sequential,
-    /// Link after link, then the product's adjustment.
+    /// The link-by-link sweep, followed by the product's adjustment.
     SequentialAdjusted,
-    /// As the product does, but that scans are taken to be where they are said to be.
+    /// The method of the product with scan poses taken as exact.
     ScansHeld,
-    /// The product's adjustment alone, from the truth: no search can do better.
+    /// The product's adjustment alone, from the truth: the best that any search can reach.
     FromTruth,
 }
 
-/// What a cell is like and how it is scanned.
+/// Contents of a cell, and how it is scanned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Condition {
     pub(super) n_scanners: usize,
@@ -144,7 +144,7 @@ pub(super) struct DrawnCase {
 }
 
 impl DrawnCase {
-    /// Whether it is measured beside the product: its figures are not the product's.
+    /// Whether it belongs to a baseline, whose figures are not those of the product.
     pub(super) fn is_baseline(&self) -> bool {
         self.condition.way != Way::Whole
     }

@@ -1,4 +1,4 @@
-//! A case in; the scene that its seed draws, with the true base and posture, out.
+//! Draws the scene of a case from its seed, with the true base and posture.
 
 use super::cell::Start;
 use super::condition::{Condition, DrawnCase, Mounting};
@@ -16,7 +16,7 @@ use simulate::scene::{
 use simulate::{Postures, Scene};
 use std::f64::consts::TAU;
 
-/// A case, drawn.
+/// A drawn case.
 pub(super) struct DrawnCell {
     pub(super) scene: Scene,
     pub(super) world_from_base: Pose,
@@ -165,7 +165,7 @@ pub(super) fn draw(case: &DrawnCase, model: &Model) -> Result<DrawnCell> {
     Ok(DrawnCell { scene, world_from_base, posture, other_branches, beside })
 }
 
-/// A scene of this seed with nothing but a floor, as level as floors are.
+/// An empty scene of this seed with a floor, as level as real floors are.
 fn empty(seed: u64, random: &mut Random) -> Scene {
     Scene {
         seed,
@@ -294,7 +294,7 @@ fn reach(model: &Model, world_from_base: &Pose, posture: &[f64]) -> [f64; 2] {
     out
 }
 
-/// Things that stand around a robot of this reach, metres, each with this chance.
+/// Objects around a robot of this reach (metres), each with this probability.
 fn around(scene: &mut Scene, chance: f64, reach: f64, random: &mut Random) {
     let there = |random: &mut Random| random.unit() < chance;
     // Beside the robot, so far beyond its reach.

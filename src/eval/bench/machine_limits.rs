@@ -1,5 +1,5 @@
-//! A file and a folder in; what this machine can do at best out: copying the file, copying memory.
-//! A run is measured against both, in the same minute.
+//! Measures the limits of the machine, copying a file and copying memory, at the same time as a run
+//! that is compared with them.
 
 use contract::{Error, Result};
 use serde::Serialize;
@@ -12,7 +12,7 @@ use std::time::Instant;
 const PIECE: usize = 1 << 20;
 /// Buffers of the memory test, bytes: more than any cache.
 const BUFFER: usize = 128 << 20;
-/// Times that memory is copied; the median counts.
+/// Number of copies in memory; the median counts.
 const N_COPIES: usize = 7;
 
 /// A copy of a file, cold, synced.
@@ -58,7 +58,7 @@ pub(super) fn copy(path: &Path, most: u64) -> Result<Copied> {
     Ok(Copied { n_bytes: copied.map_err(failed)?, seconds })
 }
 
-/// Has the system forget what it keeps of a file in memory, so that it is read from disk.
+/// Drops a file from the page cache, so that it is read from disk.
 pub(super) fn forget(path: &Path) -> Result<()> {
     let failed = |e: std::io::Error| Error::from(e).at(path.display());
     let file = File::open(path).map_err(failed)?;

@@ -1,6 +1,5 @@
-//! A drawn robot in; what stands in the way of its scanners as METHOD.md §19 (T6) has it out:
-//! plates about its foot, a conveyor that touches it, a fence on three sides, another robot whose
-//! arm crosses it.
+//! Obstacles around a random robot (METHOD.md §19, T6): plates about its foot, a conveyor that
+//! touches it, a fence on three sides, and another robot whose arm crosses it.
 
 use super::condition::{Condition, DrawnCase};
 use contract::Result;

@@ -1,5 +1,5 @@
-//! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed
-//! loops, the basin.
+//! Tables that do not follow the suites: the paper's Table 1, closed loops, and the basin of
+//! convergence.
 
 use super::score::{AccuracyRow, JointRow};
 use contract::{Calibration, JointFrame};

@@ -1,6 +1,5 @@
-//! `bench plan`: a seed in; halls drawn from it, each with a library of its own, scanned to files,
-//! asked what they will take and then done; what was predicted beside what was measured, out. The
-//! rows hold what `scripts/plan_rates.py` measures rates from.
+//! `bench plan`: draws halls with their own libraries, estimates each with `plan`, runs it, and
+//! compares prediction and measurement. `scripts/plan_rates.py` computes the rates from its rows.
 
 use super::journal::Journal;
 use super::process_watch::{Watched, watch};
@@ -19,10 +18,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What is asked for.
+/// Request of the bench.
 #[derive(Debug, Clone)]
 pub struct PlanBench {
-    /// Halls.
+    /// Number of halls.
     pub n_halls: usize,
     /// Number of the first of them.
     pub first: usize,
@@ -66,7 +65,7 @@ struct PlanRow {
     library_bytes: u64,
     format: Scanned,
     n_threads: usize,
-    /// What `plan` said, and how long it took, seconds.
+    /// Estimate of `plan`, and its time, seconds.
     planned: Estimate,
     plan_seconds: f64,
     /// The run: its stages, time, processor time and memory.
@@ -74,8 +73,8 @@ struct PlanRow {
     /// Bytes of the store and of what was written.
     store_bytes: u64,
     output_bytes: u64,
-    /// Processes that waited for a processor, about: the mean over the minute before the end,
-    /// where the system tells.
+    /// Mean number of processes that waited for a processor in the last minute, where the system
+    /// states it.
     load: f64,
 }
 
@@ -220,7 +219,7 @@ fn line(row: &PlanRow) -> String {
     )
 }
 
-/// Predicted beside measured, a line each.
+/// Predicted and measured values, one line per hall.
 fn table(rows: &[PlanRow]) -> String {
     let mut out = String::from(
         "| hall | robots | models | M points | plan took, s | time planned, s | measured, s | processors / threads, s | that / planned | memory planned | measured | disk planned | measured | load |\n",

@@ -1,5 +1,5 @@
-//! Rows in; two pictures as SVG out: how the errors of each suite are spread, and how they compare
-//! with what was stated.
+//! Two plots as SVG: the distribution of the errors of each suite, and their comparison with the
+//! stated deviations.
 
 use super::score::AccuracyRow;
 use std::fmt::Write as _;

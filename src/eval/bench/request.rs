@@ -1,4 +1,4 @@
-//! What a bench is asked for: which cases of which seed, with which robots, and where rows go.
+//! Requests of benches: cases, seeds, robots, and folders for rows.
 
 use crate::eval::demo;
 use contract::{Error, Kind, Result};
@@ -7,12 +7,12 @@ use simulate::Plant;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Cases that are drawn from a seed.
+/// Random cases of a seed.
 #[derive(Debug, Clone)]
 pub struct DrawnCases {
     /// Number of the first case.
     pub first: usize,
-    /// Seed of all.
+    /// Seed of all cases.
     pub seed: u64,
     /// Robot library; the demo's robots where left out.
     pub robots: Option<PathBuf>,
@@ -82,7 +82,7 @@ pub enum RescanSuite {
     Lines,
 }
 
-/// What is asked for.
+/// Request of the rescan bench.
 #[derive(Debug, Clone)]
 pub struct RescanBench {
     /// Seed, library and folders.

@@ -1,5 +1,5 @@
-//! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was
-//! changed, what it invented, and its time beside a run of the whole, out.
+//! `bench rescan`: draws plants of which one cell is scanned again, and reports which changes a
+//! rescan has found, which it has invented, and its time beside a run of the whole plant.
 
 use super::cases::{CaseRow, CaseToRun, Cases};
 use super::process_watch::{command, watch};
@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A found thing nearer to a true one than this is it, metres.
+/// Distance below which a found body is a true one, metres.
 const SAME_THING: f64 = 0.35;
 
 /// One case.
@@ -36,7 +36,7 @@ struct RescanRow {
     barrel: bool,
     /// Where it stood was said not to have been looked at.
     unseen: bool,
-    /// Changes that are none, in words.
+    /// Messages about wrong changes.
     invented: Vec<String>,
     /// Robots that were found, and all of the plant.
     n_robots: [usize; 2],

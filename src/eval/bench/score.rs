@@ -1,4 +1,4 @@
-//! A drawn cell and what was found in it in; one row of figures out.
+//! Scores a case: compares what was found in a random cell with the truth, as one row of figures.
 
 use super::cell::{FoundInCell, Start};
 use super::condition::DrawnCase;
@@ -10,7 +10,7 @@ use geometry::{Point, Pose, Vector};
 use robot::{JointKind, Model, Role};
 use serde::Serialize;
 
-/// A fit farther than this from the true base is not it, metres.
+/// Distance of bases beyond which a fit is not the true robot, metres.
 const SAME_PLACE: f64 = 0.5;
 /// A joint is right within this, radians (0.3°) or metres …
 const RIGHT: f64 = 0.005_236;

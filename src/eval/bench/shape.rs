@@ -1,5 +1,5 @@
-//! A model in; the same as a real robot differs from it out: its surface off by a smooth field
-//! along its normals, as castings are, or its joints elsewhere.
+//! Deforms a model as real robots differ from theirs: a smooth displacement of the surface along
+//! its normals, as castings have, a missing cover, a larger link, or shifted joints.
 
 use geometry::{Pose, Vector};
 use robot::{JointKind, Model};

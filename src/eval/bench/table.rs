@@ -1,4 +1,4 @@
-//! Rows in; the table for people and the one for programs out.
+//! Tables of the accuracy bench for people and for programs.
 
 use super::labels::{LabelScores, share_of};
 use super::score::AccuracyRow;

@@ -1,6 +1,6 @@
-//! `bench throughput`: sizes of plants in; each drawn, scanned to files and sent through the main
-//! job in a process of its own; points a second of every stage beside what the machine can do, and
-//! resident memory, out.
+//! `bench throughput`: draws plants of given sizes, scans them to files and runs the main job in
+//! its own process. Reports points per second of every stage beside the limits of the machine, and
+//! resident memory.
 
 use super::machine_limits::{Copied, copy, forget, memory};
 use super::process_watch::{Watched, command, watch};
@@ -16,7 +16,7 @@ use simulate::Plant;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What is asked for.
+/// Request of the bench.
 #[derive(Debug, Clone)]
 pub struct ThroughputBench {
     /// Beams of each plant.

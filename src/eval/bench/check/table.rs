@@ -1,5 +1,4 @@
-//! Paths that were checked, with what is true of them, in; tables for people and a line a path for
-//! programs out.
+//! Tables of the path bench for people, and one line per path for programs.
 
 use super::super::sheet;
 use super::row::{CheckRow, PathRow, True};
