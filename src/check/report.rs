@@ -37,15 +37,15 @@ pub enum PathOutcome {
 /// Why a path is not known to be free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum PathDoubt {
-    /// It leads through space that no beam went through
+    /// The path leads through space that no beam passed through
     Unseen,
-    /// It comes nearer to uncertain points within 10 cm of where the robot was found: most are its
-    /// own and move with it, some may stand in its way
+    /// The path comes nearer to uncertain points within 10 cm of where the robot was found: most
+    /// belong to the robot and move with it, some may be obstacles
     Beside,
-    /// Parts are as near to something as they were where the robot was found
+    /// Parts are as near to an obstacle as where the robot was found
     AsFound,
-    /// The robot's posture is doubtful, not known well enough for the margin, or a joint is not
-    /// determined that the path leaves as found
+    /// The robot's posture is doubtful, not known well enough for the margin, or a joint that the
+    /// path leaves as found is undetermined
     Posture,
 }
 

@@ -64,8 +64,11 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
 /// with an obstacle, and 3 where that is not known.
 pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Result<u8> {
     if !(flags.margin.is_finite() && (0.0..=MAX_MARGIN).contains(&flags.margin)) {
-        return Err(Error::new(Kind::Usage, format!("a margin of {} m is not possible", flags.margin))
-            .hint(format!("give metres, 0 to {MAX_MARGIN}")));
+        return Err(Error::new(
+            Kind::Usage,
+            format!("a margin of {} m is not possible", flags.margin),
+        )
+        .hint(format!("give metres, 0 to {MAX_MARGIN}")));
     }
     let means = common.means()?;
     let engine = common.engine(&means)?;

@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 /// Formats that points can be converted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
-    /// One LAZ of all points, as an octree that viewers load piece by piece (Potree, QGIS)
+    /// One LAZ file of all points, as an octree that viewers load piece by piece (Potree, QGIS)
     Copc,
-    /// Two PLY files: what moves, and what stands still (Open3D, MeshLab)
+    /// Two PLY files: moving points and fixed points (Open3D, MeshLab)
     Ply,
 }
 
