@@ -34,7 +34,7 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     if let Some(manifest) = digests.unchanged(job, &output)? {
         return Ok(manifest.outcome());
     }
-    Run { job, settings: &job.means.settings, output: &output, digests: &digests, engine }.whole()
+    Run { job, settings: &job.means.settings, output: &output, digests: &digests, engine }.execute()
 }
 
 /// A run that is not answered by an unchanged result.
@@ -72,9 +72,9 @@ struct ReviewedRobots {
 }
 
 impl Run<'_> {
-    fn whole(&self) -> Result<Outcome> {
+    fn execute(&self) -> Result<Outcome> {
         let &Run { job, settings, output, digests, engine } = self;
-        let models_kept = Cache::new(output.models(), digests.models(settings));
+        let models_kept = Cache::new(output.models(), digests.models_key(settings));
         let opened = self.open(&models_kept)?;
         let (sources, scans) = (&opened.sources, &opened.sources.scans);
 
@@ -86,7 +86,7 @@ impl Run<'_> {
 
         // From the tiles: local planes and occupied space, joined over tiles and scans. After that
         // nothing is as large as the cloud.
-        let ground_kept = Cache::new(output.fits(), digests.ground(&tiles, settings));
+        let ground_kept = Cache::new(output.fits(), digests.ground_key(&tiles, settings));
         let ground = || Ground::of_tiles(scans, &store, settings, engine);
         let ground = ground_kept.get_or_compute("ground", ground)?;
         let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
@@ -95,7 +95,7 @@ impl Run<'_> {
 
         // One task for each region and model finds base poses and postures; then those that are
         // compatible are chosen.
-        let of_plant = || Cache::new(output.fits(), digests.fits(&tiles, settings));
+        let of_plant = || Cache::new(output.fits(), digests.fits_key(&tiles, settings));
         let (fits_kept, pieces_kept) = (of_plant(), of_plant());
         let library = PreparedLibrary::new(&opened.library.models);
         let search = Search::new(&library, scans, &store, &ground, settings);
@@ -125,10 +125,10 @@ impl Run<'_> {
             n_searched: [clusters.len(), regions.len()],
             written: &written,
             review: reviewed.review,
-            left_out: failures.said(job),
+            left_out: failures.messages(job),
         };
         let mut outcome = report.finish(output)?;
-        outcome.told = self.conclude(plant, robots.fits, &written, &outcome)?;
+        outcome.notes = self.conclude(plant, robots.fits, &written, &outcome)?;
         output.prune(tiles, &[&ground_kept, &fits_kept], &models_kept);
         let n_kept = [models_kept.n_kept(), input_tiles.n_kept(), fits_kept.n_kept()];
         outcome.reused = cache::reused_in_words(["models", "tiles", "fits"], n_kept);
@@ -147,7 +147,7 @@ impl Run<'_> {
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         let has_tiles = |i: &Input| {
-            let key = digests.tiles(i, &sources.scans, settings);
+            let key = digests.tiles_key(i, &sources.scans, settings);
             key.is_some_and(|key| output.has_tiles(&key))
         };
         Estimate::of(job, &sources, library.models.len(), has_tiles).checked(output.out())?;
@@ -177,7 +177,7 @@ impl Run<'_> {
             let (scans, still) = (&opened.sources.scans[..], &ground.surfaces.overlaps);
             fit::together(&mut fits, &models, (scans, still), &settings.fit);
         }
-        let review = review.did(&without, &fits, &wrong);
+        let review = review.effects(&without, &fits, &wrong);
         Ok(ReviewedRobots { robots: RobotList { fits, models }, review })
     }
 

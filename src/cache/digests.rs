@@ -105,7 +105,7 @@ impl Digests {
 
     /// The manifest of an earlier run, if that run had the same job and its files are unchanged.
     pub(crate) fn unchanged(&self, job: &Job, output: &OutputDir) -> Result<Option<Manifest>> {
-        let key = self.whole(job);
+        let key = self.result_key(job);
         key.map_or(Ok(None), |key| manifest::unchanged(&self.contents, output.out(), &key))
     }
 
@@ -119,7 +119,12 @@ impl Digests {
     }
 
     /// Key of the tiles of one input; `None` while its digest is not known.
-    pub(crate) fn tiles(&self, input: &Input, scans: &[Scan], settings: &Settings) -> Option<Key> {
+    pub(crate) fn tiles_key(
+        &self,
+        input: &Input,
+        scans: &[Scan],
+        settings: &Settings,
+    ) -> Option<Key> {
         let own = scans.iter().filter(|s| s.input == input.id);
         let own = own.map(|s| words(&(s.source_id, s.world_from_scan, s.lattice)));
         let own: Vec<String> = own.collect();
@@ -127,12 +132,12 @@ impl Digests {
     }
 
     /// Key of floor, planes and occupied space of a plant with these tiles.
-    pub(crate) fn ground(&self, tiles: &[Key], settings: &Settings) -> Key {
+    pub(crate) fn ground_key(&self, tiles: &[Key], settings: &Settings) -> Key {
         Key::of("ground", &[&words(&tiles), &words(&(&settings.lattice, &settings.floor))])
     }
 
     /// Key of the fits of all regions of a plant with these tiles.
-    pub(crate) fn fits(&self, tiles: &[Key], settings: &Settings) -> Key {
+    pub(crate) fn fits_key(&self, tiles: &[Key], settings: &Settings) -> Key {
         let s = settings;
         let ground = words(&(&s.lattice, &s.floor, &s.cluster, &s.region));
         let search = words(&(&s.view, &s.base_search, &s.fit, &s.paper, &s.robot));
@@ -140,13 +145,13 @@ impl Digests {
     }
 
     /// Key of the models of the library as they are loaded with these settings.
-    pub(crate) fn models(&self, settings: &Settings) -> Key {
+    pub(crate) fn models_key(&self, settings: &Settings) -> Key {
         Key::of("models", &[&self.library, &words(&settings.robot)])
     }
 
     /// Key of the whole result of a job; `None` while an input's digest is not known. File names
     /// are part of it, since results name their inputs.
-    pub(crate) fn whole(&self, job: &Job) -> Option<Key> {
+    pub(crate) fn result_key(&self, job: &Job) -> Option<Key> {
         let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
         let digests: Option<Vec<&String>> = self.inputs.iter().map(OnceLock::get).collect();
         let inputs = words(&(&names, digests?));

@@ -53,7 +53,7 @@ impl<'a> InputTiles<'a> {
         let scans = &self.sources.scans;
         let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);
         let resident_bytes = self.means.store_bytes() / self.sources.inputs.len().max(1);
-        let key = || digests.tiles(input, scans, &self.means.settings);
+        let key = || digests.tiles_key(input, scans, &self.means.settings);
         let [n_kept, n] = self.n_kept.get();
         self.n_kept.set([n_kept, n + 1]);
         let open = |key: &Key| Store::open(&self.folder.join(key.name()), first, resident_bytes);

@@ -59,7 +59,7 @@ pub struct OutputFile {
 
 /// Outcome of verifying the files of a result.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Checked {
+pub struct Verification {
     /// The manifest.
     pub manifest: Manifest,
     /// Digest of the manifest. A copy kept elsewhere also detects a manifest that was made anew.
@@ -214,7 +214,7 @@ impl Manifest {
             reused: vec![
                 "everything: neither inputs, library, settings nor program have changed".into(),
             ],
-            told: Vec::new(),
+            notes: Vec::new(),
         }
     }
 }
@@ -263,7 +263,7 @@ fn forget_exports(out: &Path) -> Vec<String> {
 ///
 /// # Errors
 /// There is no valid manifest.
-pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
+pub fn check(out: &Path, engine: &Engine) -> Result<Verification> {
     let (manifest, digest) = Manifest::read_with_digest(out)?;
     let look = |file: &OutputFile| -> Result<Option<String>> {
         let path = match without_links(out, &file.path) {
@@ -292,7 +292,7 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
         })
     };
     let wrong = engine.fan_out("verify", manifest.files.iter().collect(), look)?;
-    Ok(Checked { manifest, digest, wrong: wrong.into_iter().flatten().collect() })
+    Ok(Verification { manifest, digest, wrong: wrong.into_iter().flatten().collect() })
 }
 
 /// The manifest of `out`, if it has this key and every file is unchanged as far as lengths, times

@@ -19,8 +19,8 @@ pub(crate) use digests::Digests;
 pub(crate) use key::Key;
 #[cfg(fuzzing)]
 pub(crate) use manifest::sealed;
-pub use manifest::{Checked, Manifest, OutputFile, check};
 pub(crate) use manifest::{EXPORT, copc_name, tiles_of};
+pub use manifest::{Manifest, OutputFile, Verification, check};
 pub use output::OutputDir;
 pub(crate) use pieces::{Cache, read, reused_in_words, written};
 pub(crate) use publish::WholeResult;

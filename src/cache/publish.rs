@@ -26,7 +26,7 @@ impl WholeResult<'_> {
     /// An input without a digest; an error of the file system.
     pub(crate) fn publish(self, engine: &Engine) -> Result<Vec<String>> {
         let Self { job, output, digests, outcome, files } = self;
-        Manifest::write(output.next(), digests.whole(job), outcome, files, engine)?;
+        Manifest::write(output.next(), digests.result_key(job), outcome, files, engine)?;
         let (manifest, told) = Manifest::publish(output.next(), output.out())?;
         digests.remember(&manifest, output.out())?;
         Ok(told)

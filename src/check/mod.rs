@@ -36,7 +36,7 @@ use trajectory::Trajectory;
 pub fn check(request: &CheckRequest, means: &Means, engine: &Engine) -> Result<PathReport> {
     let path = Trajectory::read(&request.trajectory, means.settings.ingest.max_text_bytes)?;
     let choose = |result: &ResultFile, state: &PlantState| chosen(request, result, state, &path);
-    at_robot(request, choose, means, engine, |place| place.look(&path, engine))
+    at_robot(request, choose, means, engine, |place| place.check_path(&path, engine))
 }
 
 /// A robot of a result with its surroundings, for checking several paths.
@@ -76,7 +76,7 @@ pub(crate) fn at_robot<T>(
         .hint("run the same job again"));
     }
     let number = choose(&result, &state)?;
-    let (fits, models) = stood(request, &state, means, engine)?;
+    let (fits, models) = reported_robots(request, &state, means, engine)?;
     let robots: Vec<CheckedRobot<'_>> = (fits.iter())
         .map(|(number, fit)| {
             let (entry, model) = (&result.robots[*number], &models[fit.model]);
@@ -106,7 +106,7 @@ impl RobotSite<'_> {
     ///
     /// # Errors
     /// A path that does not belong to the robot, or a cancelled run.
-    pub(crate) fn look(&self, path: &Trajectory, engine: &Engine) -> Result<PathReport> {
+    pub(crate) fn check_path(&self, path: &Trajectory, engine: &Engine) -> Result<PathReport> {
         let &Self { request, robot, ref body, ref obstacles, .. } = self;
         let postures = robot.postures(path, request.degrees)?;
         let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
@@ -225,15 +225,15 @@ fn chosen(
 }
 
 /// A fit and its index in the result.
-type Numbered = (usize, Fit);
+type NumberedFit = (usize, Fit);
 
 /// All reported robots with their indices, and their models.
-fn stood(
+fn reported_robots(
     request: &CheckRequest,
     state: &PlantState,
     means: &Means,
     engine: &Engine,
-) -> Result<(Vec<Numbered>, Vec<Model>)> {
+) -> Result<(Vec<NumberedFit>, Vec<Model>)> {
     let dir = request.robots.as_deref().unwrap_or(&state.robots);
     let stands = |fit: &Fit| fit.verdict != Verdict::Refused;
     let (numbers, fits): (Vec<usize>, Vec<Fit>) =

@@ -45,7 +45,7 @@ struct Sorting<'a> {
 }
 
 /// Sorted points of a tile.
-struct Sorted {
+struct SortedPoints {
     cells: Cells,
     n_waiting: usize,
     /// Cells of points attached to each link, and whether all beams to them grazed an edge.
@@ -104,7 +104,7 @@ impl Surroundings<'_> {
         let names = tiles_of(&self.files.manifest().files, edge, &[&world]);
         let las = self.state.records.las();
         let tiles = engine.fan_out(Task::new("points"), names, |name| {
-            let mut own = Sorted::new(sorting);
+            let mut own = SortedPoints::new(sorting);
             let (path, stated) = self.files.stated(&name)?;
             read_tile(&path, &las, stated, |points| {
                 points.iter().try_for_each(|p| self.sort(sorting, p, &mut own))?;
@@ -114,7 +114,7 @@ impl Surroundings<'_> {
             own.settle(0);
             Ok(own)
         })?;
-        let mut all = Sorted::new(sorting);
+        let mut all = SortedPoints::new(sorting);
         for own in tiles {
             all.cells.join(own.cells);
             for (link, cells) in own.hung {
@@ -188,7 +188,7 @@ impl Surroundings<'_> {
         all.into_iter().filter_map(eye).collect()
     }
 
-    fn sort(&self, sorting: &Sorting<'_>, point: &OldPoint, into: &mut Sorted) -> Result<()> {
+    fn sort(&self, sorting: &Sorting<'_>, point: &OldPoint, into: &mut SortedPoints) -> Result<()> {
         let p = sorting.base_from_world * Point::from(point.world);
         let label = point.label;
         let is_own = label.robot == sorting.number;
@@ -269,7 +269,7 @@ impl Sorting<'_> {
     }
 }
 
-impl Sorted {
+impl SortedPoints {
     fn new(sorting: &Sorting<'_>) -> Self {
         let cells = Cells::within(sorting.far, &sorting.eyes);
         Self { cells, n_waiting: 0, hung: BTreeMap::new() }

@@ -6,7 +6,7 @@ use super::say::LogFormat;
 use crate::check::PathDoubt;
 use crate::engine::Engine;
 use crate::engine::progress::{Mode, Progress};
-use crate::job::{Given, Means};
+use crate::job::{FlagValues, Means};
 use crate::result::conversion::Format;
 use clap::{Args, Parser, Subcommand};
 use contract::Result;
@@ -323,7 +323,7 @@ impl Common {
     pub(super) fn means(&self) -> Result<Means> {
         let method = self.method.iter().map(|name| format!("fit.method={name}"));
         let units = self.units.iter().map(|unit| format!("ingest.units=\"{unit}\""));
-        Means::of(&Given {
+        Means::of(&FlagValues {
             memory: self.memory.clone(),
             threads: self.threads,
             config: self.config.clone(),

@@ -36,10 +36,10 @@ fn failed(job: &Job, error: &Error) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Given, Means};
+    use crate::job::{FlagValues, Means};
 
     fn job(keep_going: bool) -> Job {
-        let means = Means::of(&Given::default()).expect("defaults");
+        let means = Means::of(&FlagValues::default()).expect("defaults");
         let inputs = vec!["a/one.e57".into(), "a/two.e57".into()];
         Job { keep_going, ..Job::new(inputs, "r".into(), "o".into(), means) }
     }

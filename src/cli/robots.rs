@@ -4,7 +4,7 @@
 use super::exit;
 use super::flags::{CalibrateFlags, Common, LintFlags};
 use super::say::Say;
-use crate::detect::calibrate::{Wanted, together};
+use crate::detect::calibrate::{WantedRobots, combine};
 use contract::words::count;
 use contract::{Kind, Result, quote};
 use robot::{Finding, Library, Severity};
@@ -34,10 +34,10 @@ pub(super) fn lint(flags: &LintFlags, common: &Common, say: &Say) -> Result<u8> 
 
 /// Combines the calibrations of some results.
 pub(super) fn calibrate(flags: &CalibrateFlags, common: &Common, say: &Say) -> Result<u8> {
-    let wanted = Wanted { model: flags.model.as_deref(), robots: &flags.robot };
+    let wanted = WantedRobots { model: flags.model.as_deref(), robots: &flags.robot };
     let most = common.means()?.settings.ingest.max_text_bytes;
     let readings = flags.readings.as_deref().map(|file| (file, most));
-    let found = together(&flags.results, &wanted, readings)?;
+    let found = combine(&flags.results, &wanted, readings)?;
     found.write(&flags.robots, &flags.out)?;
     say.result(&found.words(&flags.out));
     Ok(exit::OK)

@@ -54,7 +54,7 @@ impl Say {
     /// Writes the outcome of a run: warnings and pieces that were used again to standard error, the
     /// summary to standard output.
     pub(super) fn outcome(&self, outcome: &Outcome) {
-        outcome.warnings.iter().chain(&outcome.told).for_each(|warning| self.warning(warning));
+        outcome.warnings.iter().chain(&outcome.notes).for_each(|warning| self.warning(warning));
         for piece in &outcome.reused {
             self.line(&match self.format {
                 LogFormat::Text => format!("used again: {piece}"),

@@ -45,7 +45,7 @@ pub(crate) fn calibrate(
 }
 
 /// Which robots of the results are combined.
-pub struct Wanted<'a> {
+pub struct WantedRobots<'a> {
     /// Name of the model; `None` for the only calibrated model.
     pub model: Option<&'a str>,
     /// Ids of the robots; all robots of the model where empty.
@@ -53,7 +53,7 @@ pub struct Wanted<'a> {
 }
 
 /// Joint corrections of one robot, combined from several postures.
-pub struct Together {
+pub struct CombinedCalibration {
     model: String,
     n_postures: usize,
     calibration: Calibration,
@@ -86,11 +86,11 @@ struct PostureReadings {
 ///
 /// # Errors
 /// A result that cannot be read, robots of several models, or none that was calibrated.
-pub fn together(
+pub fn combine(
     results: &[PathBuf],
-    wanted: &Wanted<'_>,
+    wanted: &WantedRobots<'_>,
     readings: Option<(&Path, u64)>,
-) -> Result<Together> {
+) -> Result<CombinedCalibration> {
     let mut robots: Vec<(PathBuf, RobotEntry)> = Vec::new();
     for path in results {
         let result = result_of(path)?;
@@ -125,7 +125,7 @@ pub fn together(
     };
     let zeros =
         readings.map(|(file, most)| zeros(file, most, &robots)).transpose()?.unwrap_or_default();
-    Ok(Together { model, n_postures: own.len(), calibration, zeros })
+    Ok(CombinedCalibration { model, n_postures: own.len(), calibration, zeros })
 }
 
 /// Offsets of the joints' zeros: weighted means of fitted value less reading.
@@ -156,7 +156,7 @@ fn zeros(
     Ok(sums.into_iter().map(|(name, [s, w])| (name, [s / w, w.sqrt().recip()])).collect())
 }
 
-impl Together {
+impl CombinedCalibration {
     /// Writes the corrected model to a library: a copy of the model's folder, with the joints of
     /// its URDF corrected, under its own name in `out`.
     ///

@@ -43,7 +43,7 @@ impl RegionFailures {
     }
 
     /// Messages about everything that was left out, in the order of inputs and positions.
-    pub(crate) fn said(self, job: &Job) -> Vec<String> {
+    pub(crate) fn messages(self, job: &Job) -> Vec<String> {
         let list = self.list.into_inner().unwrap_or_default();
         job.left_out.iter().cloned().chain(list.into_values()).collect()
     }
@@ -52,12 +52,12 @@ impl RegionFailures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Given, Means};
+    use crate::job::{FlagValues, Means};
     use contract::Error;
     use geometry::{Aabb, Point};
 
     fn job(keep_going: bool) -> Job {
-        let means = Means::of(&Given::default()).expect("defaults");
+        let means = Means::of(&FlagValues::default()).expect("defaults");
         let inputs = vec!["a/one.e57".into(), "a/two.e57".into()];
         Job { keep_going, ..Job::new(inputs, "r".into(), "o".into(), means) }
     }
@@ -72,7 +72,7 @@ mod tests {
         let none: Vec<u8> = failures.spare(&region, || panic!("a fault")).expect("forgiven");
         assert!(none.is_empty());
         assert!(failures.spare(&region, || Err::<u8, _>(Error::new(Kind::Io, "disk"))).is_err());
-        let said = failures.said(&job(true));
+        let said = failures.messages(&job(true));
         assert!(said.len() == 1 && said[0].contains("(4.0, 0.0, 0.0)"), "{said:?}");
         let strict = RegionFailures::of(&job(false));
         assert!(strict.spare(&region, || Err::<u8, _>(Error::new(Kind::Bug, "fault"))).is_err());

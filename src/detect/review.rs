@@ -2,13 +2,13 @@
 //! change the fits.
 //!
 //! ```toml
-//! [[robot]]                     # one for each place that something is known of
-//! at = [2.7, 0.0, 0.3]          # near its base, world, metres
-//! radius = 0.5                  # how near, metres
-//! model = "kuka_kr10"           # no other model stands here
-//! verdict = "accept"            # or "reject": no robot stands here; left out: as the program finds
-//! joints = { joint_1 = 0.35 }   # near which posture it stands, radians or metres: the fit begins there; other joints as found, else 0
-//! rpy = [0.0, 0.0, 1.57]        # with joints: `at` is its base, so turned (URDF, radians); else the base that was found
+//! [[robot]]                     # one entry for each place
+//! at = [2.7, 0.0, 0.3]          # a point near the base, world frame, metres
+//! radius = 0.5                  # greatest distance of the base from that point, metres
+//! model = "kuka_kr10"           # the only model that may stand here
+//! verdict = "accept"            # or "reject": no robot stands here; without it as found
+//! joints = { joint_1 = 0.35 }   # start of the fit, radians or metres; others as found, else 0
+//! rpy = [0.0, 0.0, 1.57]        # with joints: orientation of the base, whose origin is `at`
 //! ```
 //!
 //! The user keeps the file and passes it to every run, so that its statements survive reruns.
@@ -173,7 +173,7 @@ impl Review {
         fits
     }
 
-    /// The robots that would be reported without the review, for [`Review::did`]; empty for a
+    /// The robots that would be reported without the review, for [`Review::effects`]; empty for a
     /// review without entries.
     #[must_use]
     pub(crate) fn without(&self, found: &[Fit], models: &[Model]) -> Vec<Fit> {

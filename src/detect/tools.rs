@@ -53,7 +53,7 @@ pub(crate) fn attach_tools(
             Ok(attached.flatten())
         };
         let attached = search.get_or_compute(&format!("tool of {fit:?}"), find)?;
-        Ok(own(fit, arm, attached, known))
+        Ok(with_tool_model(fit, arm, attached, known))
     })?;
     Ok(take_models(attached, models))
 }
@@ -72,7 +72,7 @@ pub(crate) fn attach_tools_in(
     let arm = branched.as_ref().unwrap_or(&models[fit.model]);
     let attach = || attach_one(&fit, arm, models, library, scene, settings);
     let attached = tells_tools(&fit).then(attach).flatten();
-    let (fit, tooled) = own(fit, arm, attached, models);
+    let (fit, tooled) = with_tool_model(fit, arm, attached, models);
     (fit, tooled.or(branched))
 }
 
@@ -83,7 +83,7 @@ fn tells_tools(fit: &Fit) -> bool {
 }
 
 /// The fit with the tool that was found, and the model of arm and tool.
-fn own(
+fn with_tool_model(
     fit: Fit,
     arm: &Model,
     attached: Option<WithTool>,

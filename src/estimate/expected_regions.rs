@@ -56,7 +56,7 @@ pub struct ExpectedRegion {
 
 /// Samples the points of all inputs. A broken input gives no points: the run reports what is wrong
 /// with it.
-pub(super) fn look(
+pub(super) fn sample(
     sources: &Sources,
     settings: &Settings,
     engine: &Engine,
@@ -78,11 +78,11 @@ pub(super) fn look(
         Ok((glance.points, each))
     };
     let seen: Vec<(Vec<[f64; 3]>, f64)> = inputs.iter().map(of_input).collect::<Result<_>>()?;
-    Ok(stand(&seen, settings))
+    Ok(regions_of(&seen, settings))
 }
 
 /// Regions of these points, each of which represents a number of points.
-fn stand(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> ExpectedRegions {
+fn regions_of(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> ExpectedRegions {
     let edge = settings.lattice.voxel;
     let mut voxels: BTreeMap<[i32; 3], f64> = BTreeMap::new();
     for (points, each) in seen {
@@ -196,7 +196,7 @@ mod tests {
             }));
         }
         boxes.iter().for_each(|(min, max)| cuboid(*min, *max, &mut points));
-        stand(&[(points, 7.0)], &Settings::default())
+        regions_of(&[(points, 7.0)], &Settings::default())
     }
 
     #[test]
@@ -218,6 +218,6 @@ mod tests {
 
     #[test]
     fn nothing_has_no_floor() {
-        assert_eq!(stand(&[], &Settings::default()), ExpectedRegions::default());
+        assert_eq!(regions_of(&[], &Settings::default()), ExpectedRegions::default());
     }
 }

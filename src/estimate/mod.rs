@@ -72,7 +72,7 @@ pub struct Estimate {
     /// Least and greatest time, seconds, if no other program uses the processors.
     pub seconds: [f64; 2],
     /// Regions that would probably be searched, if points were sampled.
-    pub stand: Option<ExpectedRegions>,
+    pub expected: Option<ExpectedRegions>,
     /// Number of inputs whose tiles exist already, and of all inputs.
     pub kept_inputs: [usize; 2],
     /// Whether nothing has changed, so that the run has nothing to do.
@@ -145,7 +145,7 @@ impl Earlier {
     }
 
     fn has_tiles(&self, input: &Input, sources: &Sources, settings: &Settings) -> bool {
-        let key = self.digests.tiles(input, &sources.scans, settings);
+        let key = self.digests.tiles_key(input, &sources.scans, settings);
         key.is_some_and(|key| self.output.has_tiles(&key))
     }
 }
@@ -200,7 +200,7 @@ impl Estimate {
             tiles,
             free_bytes: free(&job.out),
             seconds: [(seconds + library::bytes(&job.robots) as f64 / 1e6 * LOAD) / threads; 2],
-            stand: None,
+            expected: None,
             kept_inputs: [n_kept, sources.inputs.len()],
             unchanged: false,
         }
@@ -208,10 +208,10 @@ impl Estimate {
 
     /// Samples the points and adds the time of the search.
     fn look(&mut self, job: &Job, sources: &Sources, engine: &Engine) -> Result<()> {
-        let stand = expected_regions::look(sources, &job.means.settings, engine)?;
-        let search = search_time::seconds(&stand, self.n_models) / job.means.n_threads as f64;
+        let expected = expected_regions::sample(sources, &job.means.settings, engine)?;
+        let search = search_time::seconds(&expected, self.n_models) / job.means.n_threads as f64;
         self.seconds = [self.seconds[0] + search / SPREAD, self.seconds[1] + search * SPREAD];
-        self.stand = Some(stand);
+        self.expected = Some(expected);
         Ok(())
     }
 
@@ -260,9 +260,9 @@ impl std::fmt::Display for Estimate {
         )?;
         writeln!(f, "tiles     about {} spatial tiles, at most {}", self.tiles[0], self.tiles[1])?;
         writeln!(f, "time      {:.0} to {:.0} s", self.seconds[0], self.seconds[1])?;
-        if let Some(stand) = &self.stand {
-            let regions = count(stand.regions.len() as u64, "region");
-            let area: f64 = stand.regions.iter().map(|r| r.size[0] * r.size[1]).sum();
+        if let Some(expected) = &self.expected {
+            let regions = count(expected.regions.len() as u64, "region");
+            let area: f64 = expected.regions.iter().map(|r| r.size[0] * r.size[1]).sum();
             writeln!(f, "search    {regions} of {area:.0} m² in all, as far as a glance tells")?;
         }
         write!(f, "kept      tiles of {kept} of {inputs}")

@@ -332,7 +332,7 @@ impl Triple {
     }
 }
 
-/// The bytes of a one-dimensional `.npy` of ours, behind its header.
+/// The data of a one-dimensional `.npy` file of this program, after its header.
 fn npy(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = std::fs::read(path).map_err(|e| Error::from(e).at(path.display()))?;
     if bytes.len() < 10 || &bytes[..6] != b"\x93NUMPY" {

@@ -42,7 +42,7 @@ impl HashTree {
 
     /// The byte range of the leaves that begin within `piece`. The last of them may reach into the
     /// next piece.
-    pub(crate) fn own(piece: &Range<u64>, n_bytes: u64) -> Range<u64> {
+    pub(crate) fn leaves_of(piece: &Range<u64>, n_bytes: u64) -> Range<u64> {
         let leaf = |at: u64| at.next_multiple_of(LEAF).min(n_bytes);
         leaf(piece.start)..leaf(piece.end)
     }
@@ -131,7 +131,7 @@ mod tests {
             cuts.sort_unstable();
             let mut tree = HashTree::new(n as u64);
             for pair in cuts.windows(2) {
-                let own = HashTree::own(&(pair[0] as u64..pair[1] as u64), n as u64);
+                let own = HashTree::leaves_of(&(pair[0] as u64..pair[1] as u64), n as u64);
                 let of = &bytes[own.start as usize..own.end as usize];
                 tree.add(HashTree::parts(own.start, of, n as u64));
             }
@@ -151,7 +151,7 @@ mod tests {
                 let mut tree = HashTree::new(n as u64);
                 for start in (0..n).step_by(step) {
                     let piece = start as u64..(start + step).min(n) as u64;
-                    let own = HashTree::own(&piece, n as u64);
+                    let own = HashTree::leaves_of(&piece, n as u64);
                     let of = &bytes[own.start as usize..own.end as usize];
                     tree.add(HashTree::parts(own.start, of, n as u64));
                 }

@@ -118,7 +118,7 @@ impl<'a> Map for Load<'a> {
             }
         };
         let start = extent.bytes.start;
-        let own = self.n_bytes.map(|n_bytes| HashTree::own(&extent.bytes, n_bytes));
+        let own = self.n_bytes.map(|n_bytes| HashTree::leaves_of(&extent.bytes, n_bytes));
         let end = own.as_ref().map_or(extent.bytes.end, |own| own.end.max(extent.bytes.end));
         let read = file.read(start, (end - start) as usize);
         let bytes = read.map_err(|e| Error::from(e).at(self.input.path.display()))?;

@@ -83,12 +83,12 @@ pub struct Outcome {
     pub reused: Vec<String>,
     /// Messages about files that were removed beside the result, written to standard error but not
     /// to the result.
-    pub told: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 /// Values of flags; `None` where a flag is missing.
 #[derive(Debug, Clone, Default)]
-pub struct Given {
+pub struct FlagValues {
     /// `--memory`.
     pub memory: Option<String>,
     /// `--threads`.
@@ -106,7 +106,7 @@ impl Means {
     /// # Errors
     /// `Usage` for an unknown key or a value of the wrong kind; `BadInput` for a configuration that
     /// cannot be read.
-    pub fn of(given: &Given) -> Result<Self> {
+    pub fn of(given: &FlagValues) -> Result<Self> {
         let mut means = Self {
             memory_bytes: MEMORY_BYTES,
             n_threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
@@ -273,7 +273,7 @@ mod tests {
 
     fn with(set: &[&str]) -> Result<Means> {
         let set = set.iter().map(ToString::to_string).collect();
-        Means::of(&Given { set, ..Given::default() })
+        Means::of(&FlagValues { set, ..FlagValues::default() })
     }
 
     #[test]
@@ -283,7 +283,7 @@ mod tests {
         let text =
             "memory = \"8GiB\"\nthreads = 3\nscanners = \"s.toml\"\n[fit]\nbeam = 77\nthin = 1\n";
         std::fs::write(&path, text).expect("writes");
-        let given = Given {
+        let given = FlagValues {
             memory: Some("1 GiB".into()),
             threads: None,
             config: Some(path),
@@ -340,7 +340,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("plant.toml");
         std::fs::write(&path, "threads = 2\n[fit\n").expect("writes");
-        let given = Given { config: Some(path), ..Given::default() };
+        let given = FlagValues { config: Some(path), ..FlagValues::default() };
         let error = Means::of(&given).expect_err("broken").to_string();
         assert!(error.contains("plant.toml: line 2: this is not TOML"), "{error}");
     }

@@ -56,8 +56,8 @@ impl Job {
     ///
     /// # Errors
     /// One of the folders contains the other.
-    pub(crate) fn apart(&self, base: &Path) -> Result<()> {
-        apart(base, &self.out)
+    pub(crate) fn refuse_base_overlap(&self, base: &Path) -> Result<()> {
+        refuse_overlap(base, &self.out)
     }
 
     /// Refuses a path that the job reads and would overwrite.
@@ -112,7 +112,7 @@ pub(crate) fn refuse_links(out: &Path) -> Result<()> {
 ///
 /// # Errors
 /// One of the folders contains the other.
-fn apart(base: &Path, out: &Path) -> Result<()> {
+fn refuse_overlap(base: &Path, out: &Path) -> Result<()> {
     let (within, outside) = (real(out), real(base));
     let what = if within == outside {
         "a rescan does not overwrite the result that it starts from"
@@ -140,7 +140,7 @@ fn real(path: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Given, Means};
+    use crate::job::{FlagValues, Means};
 
     #[test]
     fn what_is_read_is_never_written() {
@@ -154,7 +154,7 @@ mod tests {
         }
         let checked = |inputs: &[&str], robots: &str, out: &str| {
             let inputs = inputs.iter().map(|i| at(i)).collect();
-            let means = Means::of(&Given::default()).expect("defaults");
+            let means = Means::of(&FlagValues::default()).expect("defaults");
             Job::new(inputs, at(robots), at(out), means).check_places()
         };
         for good in
@@ -205,10 +205,10 @@ mod tests {
             ("link/robots", "out"),
             ("base", "."),
         ] {
-            let error = apart(&at(base), &at(out)).expect_err(out);
+            let error = refuse_overlap(&at(base), &at(out)).expect_err(out);
             assert_eq!(error.kind(), Kind::Usage);
         }
-        apart(&at("base"), &at("plain")).expect("lie apart");
-        apart(&at("base"), &at("base2")).expect("lie apart");
+        refuse_overlap(&at("base"), &at("plain")).expect("lie apart");
+        refuse_overlap(&at("base"), &at("base2")).expect("lie apart");
     }
 }

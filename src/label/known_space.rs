@@ -42,7 +42,7 @@ impl KnownSpaces<'_, '_> {
             let model = &models[fits[i].model];
             let grid = SpaceGrid::over(&bounds(&fits[i], model.reach()).shared(&known), edge);
             let mut space = self.seen(i, grid)?;
-            space.iter_mut().for_each(|space| self.stand(space, i));
+            space.iter_mut().for_each(|space| self.fill_robots(space, i));
             Ok(space)
         })
     }
@@ -63,7 +63,7 @@ impl KnownSpaces<'_, '_> {
     }
 
     /// Fills the voxels of all robots, last those of the robot whose space it is.
-    pub(crate) fn stand(&self, space: &mut Space, robot: usize) {
+    pub(crate) fn fill_robots(&self, space: &mut Space, robot: usize) {
         let FittedRobots { fits, models } = self.robots;
         let bounds = space.grid().bounds();
         let is_other = |i: usize, fit: &Fit| {

@@ -1,7 +1,7 @@
 //! Finds robots among the bodies that appeared in a cell. Each is also searched in the earlier
 //! scans, since a robot that the earlier result only missed did not appear.
 
-use super::robots::{Now, Observed, look};
+use super::robots::{Observed, RobotState, compare_robot};
 use super::session::{CellComparison, CellLabels, ComparedRobots, ground};
 use crate::detect::robots::{FittedRobots, RobotList};
 use crate::detect::search::Search;
@@ -91,8 +91,9 @@ impl CellComparison<'_> {
         engine: &Engine,
     ) -> Result<()> {
         let RobotList { fits, models } = plant;
-        let stood = engine
-            .fan_out(Task::new("fit").large(), appeared.clone(), |fit| self.stood(&fit, models))?;
+        let stood = engine.fan_out(Task::new("fit").large(), appeared.clone(), |fit| {
+            self.earlier_fit(&fit, models)
+        })?;
         for (fit, stood) in appeared.into_iter().zip(stood) {
             robots.in_cell.push(fits.len());
             robots.changed.push(fits.len());
@@ -111,7 +112,7 @@ impl CellComparison<'_> {
 
     /// The earlier posture of a robot that the earlier result does not have, if its scans show it;
     /// such a robot did not appear.
-    fn stood(&self, now: &Fit, models: &[Model]) -> Result<Option<(Fit, Option<Model>)>> {
+    fn earlier_fit(&self, now: &Fit, models: &[Model]) -> Result<Option<(Fit, Option<Model>)>> {
         let search = Search::new(
             self.library,
             &self.sources.scans,
@@ -121,10 +122,10 @@ impl CellComparison<'_> {
         );
         let (watch, other) = (VisibilityQuery::new(&self.cell, &self.old_views), self.watch());
         let seen = Observed { search: &search, watch: &watch, other_session: &other, regions: &[] };
-        let (then, own) = look(now, models, &seen)?;
+        let (then, own) = compare_robot(now, models, &seen)?;
         Ok(match then {
-            Now::Found(fit) | Now::Anew(fit, _) => Some((*fit, own)),
-            Now::Gone | Now::Unseen | Now::Open | Now::Lost => None,
+            RobotState::Found(fit) | RobotState::Anew(fit, _) => Some((*fit, own)),
+            RobotState::Gone | RobotState::Unseen | RobotState::Open | RobotState::Lost => None,
         })
     }
 

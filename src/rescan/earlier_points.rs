@@ -39,10 +39,10 @@ pub(crate) struct EarlierPoints<'a> {
 }
 
 /// The earlier points as the new scans see them.
-pub(crate) struct Compared {
+pub(crate) struct ComparedPoints {
     /// Occupancy of the earlier session, by voxel.
     pub(crate) then: SessionOccupancy,
-    tiles: Vec<Looked>,
+    tiles: Vec<LookedUpTile>,
     /// Fates of the points, by voxel.
     pub(crate) fates: Fates,
     /// For each mask, places whose surface the new scans measured again.
@@ -51,7 +51,7 @@ pub(crate) struct Compared {
 
 /// The points of one tile as the new scans see them.
 #[derive(Default)]
-struct Looked {
+struct LookedUpTile {
     mask: u32,
     /// Places that new beams passed through, with their voxels.
     through: Vec<(u64, [i32; 3])>,
@@ -96,16 +96,17 @@ impl<'a> EarlierPoints<'a> {
     }
 
     /// Looks up every point in the new scans; where those saw nothing, in the earlier ones.
-    pub(crate) fn look(
+    pub(crate) fn look_up(
         &self,
         [watch, own]: [&VisibilityQuery<'_>; 2],
         missed: Option<&NearRobots>,
         engine: &Engine,
-    ) -> Result<Compared> {
+    ) -> Result<ComparedPoints> {
         let (mut then, mut tiles) = (SessionOccupancy::default(), Vec::new());
         let fates = Fates::of(&self.cell);
         let anew: Vec<Places> = self.n_points.iter().map(|n| Places::of(*n)).collect();
-        let look = Look { past: self, watch, own, missed, fates: &fates, anew: &anew };
+        let look =
+            EarlierPointLookUp { past: self, watch, own, missed, fates: &fates, anew: &anew };
         let source = self.store.picks_once(self.tiles.clone(), 0);
         let reads = self.store.reads();
         engine.pass(self.task("compare"), source, |f| {
@@ -115,14 +116,14 @@ impl<'a> EarlierPoints<'a> {
                 Ok(())
             })
         })?;
-        Ok(Compared { then, tiles, fates, anew })
+        Ok(ComparedPoints { then, tiles, fates, anew })
     }
 
     /// All superseded places, by mask: those superseded before, measured again, of bodies that are
     /// gone, and of robots that have moved.
     pub(crate) fn superseded<'c>(
         &self,
-        compared: &'c Compared,
+        compared: &'c ComparedPoints,
         gone: &BTreeSet<[i32; 3]>,
         stands_otherwise: impl Fn(i16) -> bool,
     ) -> &'c [Places] {
@@ -143,7 +144,7 @@ impl<'a> EarlierPoints<'a> {
 
     /// Voxels of robots that the earlier result missed: what the new scans see through of them is
     /// gone.
-    pub(crate) fn missed(compared: &Compared) -> impl Iterator<Item = &[i32; 3]> {
+    pub(crate) fn missed(compared: &ComparedPoints) -> impl Iterator<Item = &[i32; 3]> {
         compared.tiles.iter().flat_map(|tile| &tile.missed)
     }
 
@@ -249,7 +250,7 @@ impl Map for Sample<'_> {
 /// Points of a tile that are looked up; kept from tile to tile, since fresh memory costs more time
 /// than the look-up.
 #[derive(Default)]
-struct Asked {
+struct PointsToLookUp {
     places: Vec<u64>,
     worlds: Vec<[f64; 3]>,
     labels: Vec<Label>,
@@ -257,7 +258,7 @@ struct Asked {
 }
 
 /// The map that looks up points in the new scans.
-struct Look<'a> {
+struct EarlierPointLookUp<'a> {
     past: &'a EarlierPoints<'a>,
     watch: &'a VisibilityQuery<'a>,
     /// Look-up in the earlier scans.
@@ -268,16 +269,16 @@ struct Look<'a> {
     anew: &'a [Places],
 }
 
-impl Map for Look<'_> {
+impl Map for EarlierPointLookUp<'_> {
     type In = Tile;
-    type Out = Looked;
-    type Scratch = Asked;
+    type Out = LookedUpTile;
+    type Scratch = PointsToLookUp;
 
-    fn apply(&self, tile: Tile, asked: &mut Asked) -> Result<Looked> {
+    fn apply(&self, tile: Tile, asked: &mut PointsToLookUp) -> Result<LookedUpTile> {
         let (scan, mask) = self.past.scan(&tile);
         let old = &self.past.before[mask.0 as usize];
         let is_new = |place: u64| old.is_empty() || old.binary_search(&place).is_err();
-        let Asked { places, worlds, labels, sights } = asked;
+        let PointsToLookUp { places, worlds, labels, sights } = asked;
         places.clear();
         worlds.clear();
         let in_world = World::from(scan);
@@ -290,7 +291,7 @@ impl Map for Look<'_> {
         }
         self.past.labels(mask, places, labels)?;
         self.watch.look_all(worlds, sights);
-        let mut out = Looked { mask: mask.0, ..Looked::default() };
+        let mut out = LookedUpTile { mask: mask.0, ..LookedUpTile::default() };
         let mut tallying = OccupancyBuilder::default();
         let mut anew = self.anew[mask.0 as usize].adding();
         let mut missed = self.missed.map(|near| near.of(mask));
@@ -381,7 +382,7 @@ impl Weigh for Sampled {
     }
 }
 
-impl Weigh for Looked {
+impl Weigh for LookedUpTile {
     fn weight_bytes(&self) -> usize {
         size_of_val(&*self.through) + size_of_val(&*self.robots)
     }

@@ -8,7 +8,7 @@ use robot::Model;
 
 /// The earlier result, the comparison of both sessions in the cell, and the robots as they stand
 /// now.
-pub(crate) struct Found<'a, 's> {
+pub(crate) struct RescanFindings<'a, 's> {
     pub(crate) base: &'a EarlierResult,
     pub(crate) session: &'a CellComparison<'s>,
     pub(crate) robots: &'a ComparedRobots,

@@ -2,7 +2,7 @@
 //! within the cell by the new scans. Points are marked in them while they are labelled and tiles
 //! are written.
 
-use super::found::Found;
+use super::found::RescanFindings;
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
 use crate::engine::{Engine, Task};
@@ -13,7 +13,7 @@ use freespace::Passed;
 use geometry::Aabb;
 use std::path::Path;
 
-impl Found<'_, '_> {
+impl RescanFindings<'_, '_> {
     /// For each fit, the space of a robot that has moved, or whose space reaches places with
     /// compared points.
     pub(super) fn spaces(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
@@ -60,11 +60,11 @@ impl Found<'_, '_> {
         let grid = SpaceGrid::over(&reach, edge);
         let Some(old) = old.filter(|_| !places.is_empty()) else {
             let mut seen = around.seen(i, grid)?;
-            seen.iter_mut().for_each(|space| around.stand(space, i));
+            seen.iter_mut().for_each(|space| around.fill_robots(space, i));
             return Ok(seen);
         };
         let mut space = Space::unknown(grid);
-        around.stand(&mut space, i);
+        around.fill_robots(&mut space, i);
         let passed = Passed::new(&self.session.cell, &self.session.new_views, grid.edge);
         renew(&mut space, &old, places, |middle| passed.is_free(middle));
         Ok(Some(space))

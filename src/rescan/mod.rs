@@ -33,7 +33,7 @@ use crate::store::Store;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
 use earlier_points::EarlierPoints;
 use earlier_result::EarlierResult;
-use found::Found;
+use found::RescanFindings;
 use geometry::{Aabb, Pose};
 use ingest::{KnownScanners, Sources};
 use robot::Library;
@@ -67,7 +67,7 @@ pub fn rescan(request: &RescanRequest, engine: &Engine) -> Result<Outcome> {
     if let Some(manifest) = digests.unchanged(&job, &output)? {
         return Ok(manifest.outcome());
     }
-    Rescan { base: &base, job: &job, output: &output, digests: &digests, engine }.whole(request)
+    Rescan { base: &base, job: &job, output: &output, digests: &digests, engine }.execute(request)
 }
 
 /// A rescan that is not answered by an unchanged result.
@@ -81,11 +81,11 @@ struct Rescan<'a> {
 }
 
 impl Rescan<'_> {
-    fn whole(&self, request: &RescanRequest) -> Result<Outcome> {
+    fn execute(&self, request: &RescanRequest) -> Result<Outcome> {
         let &Rescan { base, job, output, digests, engine } = self;
         let settings = &job.means.settings;
         base.share_store(output)?;
-        let models_kept = Cache::new(output.models(), digests.models(settings));
+        let models_kept = Cache::new(output.models(), digests.models_key(settings));
         let (library, mut sources) = self.given(&models_kept)?;
 
         // The new scans are read into tiles; those of the plant exist already.
@@ -97,7 +97,7 @@ impl Rescan<'_> {
         let mut plant = library::robots_of(base.state.fits.clone(), &library)?;
         let scans = base.state.scans.clone();
         let past = EarlierPoints::new(base, &scans, &old, Aabb::EMPTY)?;
-        let stood = session::stood(plant.view());
+        let stood = session::earlier_bounds(plant.view());
         let wish = &request.frame;
         let carried = frame::carry(wish, &past, stood, &mut sources, &mut new, engine)?;
 
@@ -105,7 +105,7 @@ impl Rescan<'_> {
         let cell = session::bounds(&request.cell, base, plant.view(), &sources, &new)?;
         let past = &past.of_cell(cell);
         let prepared = &PreparedLibrary::new(&library.models);
-        let names = session::known(plant.view(), &cell);
+        let names = session::model_names(plant.view(), &cell);
         let (floor, hangs) = (&base.state.floor, robots::hang(&plant.fits, &past.cell));
         let known = || {
             prepared.prepare(&names, &OneByOne);
@@ -128,13 +128,13 @@ impl Rescan<'_> {
         // shared.
         let (session, robots, labels, carried) = (&session, &robots, &labels, &carried);
         let RobotList { fits, models } = &plant;
-        let found = Found { base, session, robots, labels, models, fits, carried };
+        let found = RescanFindings { base, session, robots, labels, models, fits, carried };
         let written = found.write(&registered, output, digests, engine)?;
         let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
         let mut outcome = written.outcome;
         let frame = carried.plant_from_new;
         let made = MadeAnew { robots, sources: &sources, tiles: &all, contents, frame };
-        outcome.told = self.conclude(plant.fits, made, written.known, &outcome)?;
+        outcome.notes = self.conclude(plant.fits, made, written.known, &outcome)?;
         output.prune_tiles(&all, &models_kept);
         let names = ["models", "tiles of new scans", "files of the earlier result"];
         let n_kept = [models_kept.n_kept(), n_kept, written.n_shared];
@@ -235,7 +235,7 @@ fn job(request: &RescanRequest, base: &EarlierResult) -> Result<Job> {
             .at(job.robots.display())
             .hint("name it with --robots"));
     }
-    job.apart(&request.base)?;
+    job.refuse_base_overlap(&request.base)?;
     job.means.settings.export = base.state.records.export(&job.means.settings.export);
     Ok(job)
 }

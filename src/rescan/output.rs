@@ -2,7 +2,7 @@
 //! the earlier result, and the result that joins them.
 
 use super::earlier_points::EarlierPoints;
-use super::found::Found;
+use super::found::RescanFindings;
 use super::report;
 use super::report::RescanReport;
 use crate::cache::{Digests, OutputDir, OutputFile};
@@ -34,7 +34,7 @@ pub(crate) struct WrittenResult {
     pub(crate) n_shared: [usize; 2],
 }
 
-impl Found<'_, '_> {
+impl RescanFindings<'_, '_> {
     pub(crate) fn write(
         &self,
         registered: &[Option<Registration>],

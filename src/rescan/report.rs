@@ -1,7 +1,7 @@
 //! Writes the result of the whole plant after a rescan, the changes as JSON, CSV and picture, and
 //! the summary for people.
 
-use super::found::Found;
+use super::found::RescanFindings;
 use crate::cache::Digests;
 use crate::detect::robot_id::robot_id;
 use crate::job::Outcome;
@@ -33,7 +33,7 @@ pub(crate) const NAMES: [&str; 6] = [
 
 /// Everything that result, changes and summary are made of.
 pub(crate) struct RescanReport<'a, 's> {
-    pub(crate) found: &'a Found<'a, 's>,
+    pub(crate) found: &'a RescanFindings<'a, 's>,
     pub(crate) done: &'a WrittenLabels,
     pub(crate) registered: &'a [Option<Registration>],
     /// For each mask of the earlier result, the list of its superseded places.

@@ -38,7 +38,7 @@ const STAYS: f64 = 0.005;
 const UPRIGHT: f64 = 0.9;
 
 /// State of an earlier robot in the new scans.
-pub(crate) enum Now {
+pub(crate) enum RobotState {
     /// It was refined from its earlier posture.
     Found(Box<Fit>),
     /// It was searched and found again; and whether the new scans contradict its earlier posture.
@@ -86,16 +86,19 @@ pub(crate) struct Observed<'s, 'a, 'm> {
 
 /// Compares one robot with the scans of this session and of the other; the model is returned where
 /// it is not in the library.
-pub(crate) fn look(
+pub(crate) fn compare_robot(
     before: &Fit,
     models: &[Model],
     seen: &Observed<'_, '_, '_>,
-) -> Result<(Now, Option<Model>)> {
+) -> Result<(RobotState, Option<Model>)> {
     let &Observed { search, watch, other_session, regions } = seen;
     let model = &models[before.model];
-    let said = said(before, model, watch);
+    let said = evidence_of(before, model, watch);
     if said.judged < MIN_JUDGED {
-        return Ok((if said.through < STANDS { Now::Unseen } else { Now::Open }, None));
+        return Ok((
+            if said.through < STANDS { RobotState::Unseen } else { RobotState::Open },
+            None,
+        ));
     }
     let near = home(before, model, regions);
     // If new beams pass through much of the earlier posture, the robot has moved and is searched
@@ -110,23 +113,23 @@ pub(crate) fn look(
             !crate::result::changes::stands_otherwise(before, &sure) && knows(&fit, before);
         match fit.verdict {
             Verdict::Trusted | Verdict::Doubtful if only_foot_turns(before, &fit, model) => {
-                return Ok((Now::Found(Box::new(before.clone())), None));
+                return Ok((RobotState::Found(Box::new(before.clone())), None));
             }
-            Verdict::Trusted if !is_same => return Ok((Now::Found(Box::new(fit)), None)),
+            Verdict::Trusted if !is_same => return Ok((RobotState::Found(Box::new(fit)), None)),
             Verdict::Trusted | Verdict::Doubtful if is_same => {
-                return Ok((Now::Found(Box::new(sure)), None));
+                return Ok((RobotState::Found(Box::new(sure)), None));
             }
             _ => {}
         }
     }
     if said.through < STANDS && before.verdict != Verdict::Refused {
-        return Ok((Now::Unseen, None));
+        return Ok((RobotState::Unseen, None));
     }
-    Ok(match anew(before, models, search, other_session, &near)? {
-        Some((fit, own)) => (Now::Anew(Box::new(fit), said.through > CONTRADICTED), own),
-        None if said.foot > GONE => (Now::Gone, None),
-        None if said.through > CONTRADICTED => (Now::Lost, None),
-        None => (Now::Open, None),
+    Ok(match search_again(before, models, search, other_session, &near)? {
+        Some((fit, own)) => (RobotState::Anew(Box::new(fit), said.through > CONTRADICTED), own),
+        None if said.foot > GONE => (RobotState::Gone, None),
+        None if said.through > CONTRADICTED => (RobotState::Lost, None),
+        None => (RobotState::Open, None),
     })
 }
 
@@ -163,7 +166,7 @@ fn knows(fit: &Fit, other: &Fit) -> bool {
 
 /// Searches a robot with a changed posture at its place; the model is returned where it is not in
 /// the library.
-fn anew(
+fn search_again(
     before: &Fit,
     models: &[Model],
     search: &Search<'_, '_>,
@@ -223,7 +226,7 @@ fn home(fit: &Fit, model: &Model, regions: &[Region]) -> Region {
     own.copied().unwrap_or_else(|| reach(fit, model))
 }
 
-fn said(fit: &Fit, model: &Model, watch: &VisibilityQuery<'_>) -> PostureEvidence {
+fn evidence_of(fit: &Fit, model: &Model, watch: &VisibilityQuery<'_>) -> PostureEvidence {
     let (mut n, mut judged, mut through) = (0_usize, 0_usize, 0_usize);
     let mut foot = None;
     for (link, pose) in model.links.iter().zip(poses(fit, model)) {

@@ -1,11 +1,11 @@
 //! Compares the earlier and the new scans of a cell: the present state of its robots, and all other
 //! bodies that changed.
 
-use super::earlier_points::{Compared, EarlierPoints};
+use super::earlier_points::{ComparedPoints, EarlierPoints};
 use super::earlier_result::EarlierResult;
 use super::new_points;
 use super::new_points::NewPoints;
-use super::robots::{Now, Observed, look};
+use super::robots::{Observed, RobotState, compare_robot};
 use crate::detect::ground::Ground;
 use crate::detect::robots::{FittedRobots, RobotList};
 use crate::detect::search::{PreparedLibrary, Search};
@@ -113,7 +113,7 @@ impl ComparedRobots {
 /// Labels of the new points, and changed bodies.
 pub(crate) struct CellLabels {
     pub(crate) near: NearRobots,
-    pub(crate) compared: Compared,
+    pub(crate) compared: ComparedPoints,
     pub(crate) things: Vec<Thing>,
     /// Earlier surfaces of the cell that no new beam has reached.
     pub(crate) unseen: Vec<Unseen>,
@@ -168,14 +168,14 @@ pub(crate) fn bounds(
 }
 
 /// Bounds of all robots in their earlier postures, world frame, metres.
-pub(crate) fn stood(robots: FittedRobots<'_>) -> Vec<Aabb> {
+pub(crate) fn earlier_bounds(robots: FittedRobots<'_>) -> Vec<Aabb> {
     let FittedRobots { fits, models } = robots;
     let all = fits.iter().filter(|fit| fit.verdict != Verdict::Refused);
     all.map(|fit| standing(fit, &models[fit.model])).collect()
 }
 
 /// Indices and bounds of robots that reach into the cell.
-fn here(robots: FittedRobots<'_>, cell: &Aabb) -> Vec<(usize, Aabb)> {
+fn robots_in(robots: FittedRobots<'_>, cell: &Aabb) -> Vec<(usize, Aabb)> {
     let FittedRobots { fits, models } = robots;
     let bounds = |(i, fit): (usize, &Fit)| (i, standing(fit, &models[fit.model]));
     let all = fits.iter().enumerate().filter(|(_, fit)| fit.verdict != Verdict::Refused);
@@ -183,8 +183,8 @@ fn here(robots: FittedRobots<'_>, cell: &Aabb) -> Vec<(usize, Aabb)> {
 }
 
 /// Names of the models of the robots in the cell, with their tools.
-pub(crate) fn known<'f>(robots: FittedRobots<'f>, cell: &Aabb) -> BTreeSet<&'f str> {
-    let here = here(robots, cell).into_iter().map(|(i, _)| &robots.fits[i]);
+pub(crate) fn model_names<'f>(robots: FittedRobots<'f>, cell: &Aabb) -> BTreeSet<&'f str> {
+    let here = robots_in(robots, cell).into_iter().map(|(i, _)| &robots.fits[i]);
     let names = here.flat_map(|fit| {
         let tool = fit.tool.as_ref().map(|tool| tool.model.as_str());
         [fit.model_name.as_str()].into_iter().chain(tool)
@@ -225,7 +225,7 @@ impl<'a> CellComparison<'a> {
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let cell = region(&past.cell.center(), &past.cell);
         let fine = ViewSettings { min_cell: LOOK_CELL, ..settings.view.clone() };
-        let old_ground = asked(past, scans.len());
+        let old_ground = earlier_coverage(past, scans.len());
         let old = Search::new(library, scans, past.store, &old_ground, settings);
         let new = Search::new(library, scans, store, &ground, settings);
         let views = engine
@@ -280,7 +280,7 @@ impl<'a> CellComparison<'a> {
         let (search, watch) = (self.search(), self.watch());
         let old_watch = VisibilityQuery::new(&self.cell, &self.old_views);
         let regions = base_search::regions(&self.clusters, &self.settings.region);
-        let here = here(plant.view(), &self.past.cell);
+        let here = robots_in(plant.view(), &self.past.cell);
         let seen = Observed {
             search: &search,
             watch: &watch,
@@ -289,20 +289,20 @@ impl<'a> CellComparison<'a> {
         };
         let RobotList { fits, models } = plant;
         let looked = engine.fan_out(Task::new("fit").large(), here.clone(), |(i, _)| {
-            look(&fits[i], models, &seen)
+            compare_robot(&fits[i], models, &seen)
         })?;
         for ((i, bounds), (now, own)) in here.into_iter().zip(looked) {
-            let is_anew = matches!(now, Now::Anew(..));
-            if matches!(now, Now::Anew(_, true)) {
+            let is_anew = matches!(now, RobotState::Anew(..));
+            if matches!(now, RobotState::Anew(_, true)) {
                 out.contradicted.push(i);
             }
             match now {
-                Now::Unseen => {
+                RobotState::Unseen => {
                     out.unseen.push(i);
                     out.as_it_stood.push(i);
                 }
-                Now::Open => out.unseen.push(i),
-                Now::Found(mut fit) | Now::Anew(mut fit, _) => {
+                RobotState::Open => out.unseen.push(i),
+                RobotState::Found(mut fit) | RobotState::Anew(mut fit, _) => {
                     if let Some(own) = own {
                         fit.model = models.len();
                         models.push(own);
@@ -314,14 +314,14 @@ impl<'a> CellComparison<'a> {
                     }
                     fits[i] = *fit;
                 }
-                Now::Gone => {
+                RobotState::Gone => {
                     out.gone.push(i);
                     out.left.push(bounds);
                     verdict::apply(&mut fits[i], &VerdictEvent::Gone);
                 }
                 // A lost robot gives no labels, since a wrong posture could label fixed points as
                 // links.
-                Now::Lost => {
+                RobotState::Lost => {
                     out.changed.push(i);
                     out.lost.push(i);
                     out.left.push(bounds);
@@ -344,7 +344,7 @@ impl<'a> CellComparison<'a> {
         let near = labelling.near_robots(self.store, engine)?;
         let (watch, old_watch) = (self.watch(), VisibilityQuery::new(&self.cell, &self.old_views));
         let missed = self.missed(plant, robots, engine)?;
-        let compared = self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
+        let compared = self.past.look_up([&watch, &old_watch], missed.as_ref(), engine)?;
         let then = &compared.then;
         let present = NewPoints {
             scans: &self.sources.scans,

@@ -14,7 +14,7 @@ const SPARSE: f64 = 2_800.0;
 const N_NAMES: usize = 3;
 
 /// Scans, tiles and models of a run that found no robot.
-pub(crate) struct Lack<'a> {
+pub(crate) struct SearchInputs<'a> {
     /// Scans with points.
     pub(crate) scans: &'a [&'a Scan],
     /// Catalogue entries of their tiles.
@@ -25,7 +25,7 @@ pub(crate) struct Lack<'a> {
     pub(crate) n_places: usize,
 }
 
-impl Lack<'_> {
+impl SearchInputs<'_> {
     /// One sentence for each input that is missing or may be missing.
     pub(crate) fn advice(&self) -> Vec<String> {
         let mut out: Vec<String> =

@@ -1,6 +1,6 @@
 //! Writes `result.json`, the legend of the masks, and the summary for people.
 
-use super::advice::Lack;
+use super::advice::SearchInputs;
 use crate::cache::{Digests, OutputDir};
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
@@ -124,7 +124,8 @@ impl Report<'_> {
             let scans: Vec<&Scan> = self.scans().collect();
             let (tiles, models) = (self.store.entries(), &self.library.models[..]);
             out.extend(
-                Lack { scans: &scans, tiles, models, n_places: self.n_searched[1] }.advice(),
+                SearchInputs { scans: &scans, tiles, models, n_places: self.n_searched[1] }
+                    .advice(),
             );
         }
         out
@@ -218,12 +219,12 @@ pub(crate) fn robot_entry(
     let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
     let tip = tip(model).map(|l| (names[l].clone(), poses(fit, model)[l]));
     let mut entry = RobotEntry { space, ..RobotEntry::new(&robot_id(index), fit, &names, tip) };
-    stand(&mut entry, fit, models);
+    add_link_poses(&mut entry, fit, models);
     entry
 }
 
 /// Adds the poses of the links, also of the same robot in other scans.
-fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
+fn add_link_poses(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
     let model = &models[fit.model];
     let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     let joints = model.joints.iter().zip(model.joint_values(&posture));
@@ -235,7 +236,7 @@ fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
     let links = model.links.iter().zip(poses(fit, model));
     entry.link_poses = NamedMap(links.map(|(l, pose)| (l.name.clone(), (&pose).into())).collect());
     for (entry, stay) in entry.stays.iter_mut().zip(&fit.stays) {
-        stand(entry, stay, models);
+        add_link_poses(entry, stay, models);
     }
 }
 

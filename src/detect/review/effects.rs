@@ -41,12 +41,17 @@ impl Review {
     /// The effect of each entry, in order, from the robots that would be reported without the
     /// review, the robots that are reported, and the entries whose posture the scans contradict.
     #[must_use]
-    pub(crate) fn did(&self, without: &[Fit], with: &[Fit], wrong: &[usize]) -> Vec<ReviewEntry> {
-        self.told(&WithAndWithout { without, with, wrong })
+    pub(crate) fn effects(
+        &self,
+        without: &[Fit],
+        with: &[Fit],
+        wrong: &[usize],
+    ) -> Vec<ReviewEntry> {
+        self.effects_of(&WithAndWithout { without, with, wrong })
     }
 
     /// The effect of each entry, in order.
-    fn told(&self, robots: &WithAndWithout<'_>) -> Vec<ReviewEntry> {
+    fn effects_of(&self, robots: &WithAndWithout<'_>) -> Vec<ReviewEntry> {
         let entry = |(k, place): (usize, &ReviewPlace)| {
             let Effect { what, is_odd } = match place.verdict {
                 Some(Decision::Reject) => self.rejected(place, robots),
@@ -204,7 +209,7 @@ mod tests {
         let review = Review { places };
         let with = review.apply(without.to_vec());
         let robots = WithAndWithout { without, with: &with, wrong: &[] };
-        review.told(&robots).into_iter().map(|e| (e.did, e.needs_look)).collect()
+        review.effects_of(&robots).into_iter().map(|e| (e.did, e.needs_look)).collect()
     }
 
     fn trusted(model: &str, x: f64) -> Fit {

@@ -50,7 +50,7 @@ pub fn accuracy(bench: &AccuracyBench, means: &Means, engine: &Engine) -> Result
     let library = PreparedLibrary::new(&models);
     let mut rows = Vec::with_capacity(cases.len());
     let store = tempfile::tempdir()?;
-    // What stages say of single cells would drown what is said of cases.
+    // Messages of stages about single cells would hide those about cases.
     let mut quiet = Engine::new(engine.n_workers);
     quiet.cancel = engine.cancel.clone();
     for (i, case) in cases.iter().enumerate() {

@@ -23,9 +23,9 @@ use std::time::Instant;
 pub struct PlanBench {
     /// Number of halls.
     pub n_halls: usize,
-    /// Number of the first of them.
+    /// Number of the first hall.
     pub first: usize,
-    /// Seed of all that is drawn.
+    /// Seed of all random values.
     pub seed: u64,
     /// Robot library that the halls' own libraries are chosen from.
     pub robots: PathBuf,
@@ -35,7 +35,7 @@ pub struct PlanBench {
     pub keep: bool,
 }
 
-/// Robots that stand in a hall: empty ones, and crowded ones.
+/// Numbers of robots in a hall: none, and many.
 const N_ROBOTS: [usize; 10] = [0, 1, 1, 2, 3, 4, 5, 6, 8, 10];
 /// Beams of a hall, fewest and most.
 const BEAMS: [f64; 2] = [2e6, 30e6];
@@ -45,7 +45,7 @@ const N_MODELS: [usize; 2] = [3, 12];
 const N_SCANS: [usize; 2] = [2, 12];
 const MORE_SCANS: usize = 3;
 
-/// What a hall is drawn from.
+/// Random values of a hall.
 struct Hall {
     seed: u64,
     n_robots: usize,
@@ -198,8 +198,8 @@ fn load() -> f64 {
 }
 
 impl PlanRow {
-    /// Processor time of the run, shared among its threads, seconds: its time on a machine that
-    /// does nothing else.
+    /// Processor time of the run divided by its threads, seconds: its time on an otherwise idle
+    /// machine.
     fn alone(&self) -> f64 {
         self.measured.cpu_seconds / self.n_threads as f64
     }

@@ -372,7 +372,7 @@ fn figures(own: &[&PlantRow]) -> String {
         let index = ((all.len() as f64 - 1.0) * share).round().max(0.0) as usize;
         all.get(index).map_or("–".into(), |v| format!("{v:.digits$}"))
     };
-    // What no robot explains is not to be labelled as one's.
+    // Points of unknown robots must not be labelled as those of a known one.
     let is_asked = |r: &PlantRow| r.n_robots > 0 && r.suite != STRANGERS;
     let f1 = sorted(&|r| if is_asked(r) { vec![r.f1] } else { vec![] });
     let ious = sorted(&|r| r.ious.clone());

@@ -34,7 +34,7 @@ struct RescanRow {
     robot: bool,
     pallet: bool,
     barrel: bool,
-    /// Where it stood was said not to have been looked at.
+    /// Whether its earlier place was reported as not compared.
     unseen: bool,
     /// Messages about wrong changes.
     invented: Vec<String>,
@@ -43,11 +43,11 @@ struct RescanRow {
     /// Largest error of a determined joint of the robot that moved, degrees: rescan, and a run of
     /// the new scans alone.
     joint: [f64; 2],
-    /// F1 of moving points in the cell, likewise.
+    /// F1 score of moving points in the cell, likewise.
     f1: [f64; 2],
-    /// Registration that is left, metres: least and largest of the scans.
+    /// Remaining registration error, metres: least and greatest of the scans.
     left: [f64; 2],
-    /// Tiles that are the same bytes, and all of the base.
+    /// Number of tiles with unchanged bytes, and of all tiles of the earlier result.
     n_same: [usize; 2],
     seconds: [f64; 2],
 }
@@ -152,7 +152,7 @@ fn judge(row: &mut RescanRow, then: &Scene, now: &Scene, out: &Path) -> Result<(
     Ok(())
 }
 
-/// Robots that are said to differ: the first one moved, no other did.
+/// Compares the reported robots: the first one moved, no other did.
 fn judge_robots(row: &mut RescanRow, robots: &[Value], now: &Scene, result: &ResultFile) {
     let base = Vector::from(now.robots[0].xyz);
     for robot in robots.iter().filter(|r| r["change"]["kind"] != "same") {
@@ -167,8 +167,7 @@ fn judge_robots(row: &mut RescanRow, robots: &[Value], now: &Scene, result: &Res
     }
 }
 
-/// Things that are said to differ: the pallet is elsewhere now, and the barrel, which stood at this
-/// place, is gone.
+/// Compares the reported bodies: the pallet was moved, and the barrel at this place is gone.
 fn judge_things(
     row: &mut RescanRow,
     things: &[Value],
@@ -202,7 +201,7 @@ fn judge_things(
     }
 }
 
-/// How far scans are off beyond what was found, metres: least and largest.
+/// Remaining registration error of the scans, metres: least and greatest.
 fn left(scans: &[Value], now: &Scene) -> [f64; 2] {
     let off = scans.iter().zip(&now.scanners).map(|(found, scanner)| {
         let shift = Vector::from([0, 1, 2].map(|i| found["shift"][i].as_f64().unwrap_or(f64::NAN)));

@@ -160,7 +160,7 @@ impl Bench<'_> {
             points: vec![from.to_vec(), path.to.clone()],
             times: Vec::new(),
         };
-        let report = place.look(&asked, self.engine)?;
+        let report = place.check_path(&asked, self.engine)?;
         let nearest = truth.along(from, &path.to, margin);
         let is = match nearest.gap {
             ..=TOUCH => True::Collides,

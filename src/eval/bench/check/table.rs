@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 const OUTCOMES: [PathOutcome; 4] =
     [PathOutcome::Free, PathOutcome::Unknown, PathOutcome::Near, PathOutcome::Blocked];
 
-/// What is true of a path, in words.
+/// Truth of a path, as text.
 fn words(of: True) -> &'static str {
     match of {
         True::Free => "keeps the margin, in seen space",
