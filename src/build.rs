@@ -1,5 +1,5 @@
-//! The program's own sources in; a number that changes with any of them out (`STILLPOINT_CODE`):
-//! what another program computed is not taken for what this one would.
+//! Build script: a digest of the program's own sources (`STILLPOINT_CODE`), which is part of all
+//! cache keys, so that pieces of another program version are never used.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -17,10 +17,10 @@ fn main() {
     let mut hasher = DefaultHasher::new();
     for file in &files {
         file.hash(&mut hasher);
-        // A file that cannot be read fails the build where it is needed.
+        // An unreadable file fails the build where it is compiled.
         std::fs::read(file).unwrap_or_default().hash(&mut hasher);
     }
-    // Processors with other vector units round otherwise.
+    // Processors with other vector units may round differently.
     for name in ["TARGET", "CARGO_CFG_TARGET_FEATURE"] {
         std::env::var(name).unwrap_or_default().hash(&mut hasher);
     }

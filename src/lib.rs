@@ -1,7 +1,8 @@
-//! How a run goes: plan, engine, store, command line, configuration, progress. Scans and a robot
-//! library in, postures and masks out. Knows no geometry: what is done stands in `stages/`.
+//! The crate that runs Stillpoint: plan, engine, store, command line, configuration and progress.
+//! It takes scans and a robot library, and writes postures and masks. The geometry is computed in
+//! `stages/`.
 //!
-//! Rooms import only rooms below them, from the bottom up:
+//! Rooms import only rooms to their left:
 //!
 //! ```text
 //! engine  io  job  store  cache  detect  label  result  estimate  rescan  check  plan  eval  cli

@@ -1,8 +1,9 @@
-//! The program: arguments in, an exit code out.
+//! The program: runs the command line and returns its exit code.
 
 use std::process::ExitCode;
 
-/// Gives memory back when a stage ends; what the next ones need would otherwise come on top of it.
+/// mimalloc returns memory to the system when a stage ends, so that the memory of the next stages
+/// does not add to it.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -11,12 +12,13 @@ fn main() -> ExitCode {
     stillpoint::cli::exit::exit(stillpoint::cli::main(std::env::args_os()))
 }
 
-/// Memory is handed from stage to stage in pieces of all sizes; in pages of 2 MiB the system clears
-/// more of it than is used, which takes up to a fifth of a short run (benches/LEARNT.md).
+/// Disables huge pages: memory passes between stages in pieces of all sizes, and with pages of 2
+/// MiB the system clears more memory than is used, which takes up to a fifth of a short run
+/// (benches/LEARNT.md).
 fn use_small_pages() {
     #[cfg(target_os = "linux")]
     {
-        // Advice only: where the system does not take it, the run is right and slower.
+        // This is advice to the system: without it the run is correct, but slower.
         let _ = rustix::thread::disable_transparent_huge_pages(true);
     }
 }

@@ -1,5 +1,5 @@
-//! The whole way of the data on one page: a job in, everything found and written, its outcome out.
-//! Nothing else decides order.
+//! The order of all steps of a run, from opened inputs to the published result. No other module
+//! decides order.
 
 use crate::cache::input_tiles::InputTiles;
 use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, WholeResult};
@@ -24,20 +24,20 @@ use export::{COPC, ReviewEntry};
 use ingest::{KnownScanners, Sources};
 use robot::Library;
 
-/// Does the main job.
+/// Runs the main job: finds the robots in the scans and labels all points.
 ///
 /// # Errors
-/// Inputs, library or settings that cannot be used, too little disk, or what a stage ends with.
+/// Inputs, library or settings that cannot be used, too little disk space, or the error of a stage.
 pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let output = job.output()?;
     let digests = Digests::of(job, &output, engine)?;
     if let Some(manifest) = digests.unchanged(job, &output)? {
         return Ok(manifest.outcome());
     }
-    Run { job, settings: &job.means.settings, output: &output, digests: &digests, engine }.whole()
+    Run { job, settings: &job.means.settings, output: &output, digests: &digests, engine }.execute()
 }
 
-/// A run that has something to do.
+/// A run that is not answered by an unchanged result.
 struct Run<'a> {
     job: &'a Job,
     settings: &'a Settings,
@@ -46,54 +46,56 @@ struct Run<'a> {
     engine: &'a Engine,
 }
 
-/// What is known before any point is read.
+/// Library, review and opened scans, before any point is read.
 struct Opened {
     library: Library,
     review: Review,
     sources: Sources,
 }
 
-/// The plant as it was scanned, before anything is searched in it.
+/// The scanned plant, before anything is searched in it.
 #[derive(Clone, Copy)]
 struct ScannedPlant<'a> {
     sources: &'a Sources,
-    /// Names of the tiles of each input.
+    /// Keys of the tiles of each input.
     tiles: &'a [Key],
     store: &'a Store,
     ground: &'a Ground,
     clusters: &'a [Cluster],
 }
 
-/// The robots that were found, as far as the review lets them.
+/// The robots that were found, after the review.
 struct ReviewedRobots {
     robots: RobotList,
-    /// What each entry of the review did.
+    /// Effect of each entry of the review.
     review: Vec<ReviewEntry>,
 }
 
 impl Run<'_> {
-    fn whole(&self) -> Result<Outcome> {
+    fn execute(&self) -> Result<Outcome> {
         let &Run { job, settings, output, digests, engine } = self;
-        let models_kept = Cache::new(output.models(), digests.models(settings));
+        let models_kept = Cache::new(output.models(), digests.models_key(settings));
         let opened = self.open(&models_kept)?;
         let (sources, scans) = (&opened.sources, &opened.sources.scans);
 
-        // First pass: every point once, from files into lattice tiles that are not there yet.
+        // First pass: every point is read once, from files into lattice tiles, unless the tiles
+        // exist already.
         let input_tiles = InputTiles::new(sources, &job.means, output.tiles(), engine);
         let (tiles, store) = input_tiles.of_all(&sources.inputs, digests)?;
         let store = spatial_tiles::checked(store, scans, &settings.export, engine)?;
 
-        // On the tiles: local planes and occupied space, joined over tiles and scans; from here on
+        // From the tiles: local planes and occupied space, joined over tiles and scans. After that
         // nothing is as large as the cloud.
-        let ground_kept = Cache::new(output.fits(), digests.ground(&tiles, settings));
+        let ground_kept = Cache::new(output.fits(), digests.ground_key(&tiles, settings));
         let ground = || Ground::of_tiles(scans, &store, settings, engine);
         let ground = ground_kept.get_or_compute("ground", ground)?;
         let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
         let clusters = cluster::split(space, floor, &settings.cluster);
         let regions = base_search::regions(&clusters, &settings.region);
 
-        // One task a region and model: base poses, postures; then those that can stand together.
-        let of_plant = || Cache::new(output.fits(), digests.fits(&tiles, settings));
+        // One task for each region and model finds base poses and postures; then those that are
+        // compatible are chosen.
+        let of_plant = || Cache::new(output.fits(), digests.fits_key(&tiles, settings));
         let (fits_kept, pieces_kept) = (of_plant(), of_plant());
         let library = PreparedLibrary::new(&opened.library.models);
         let search = Search::new(&library, scans, &store, &ground, settings);
@@ -110,7 +112,7 @@ impl Run<'_> {
         let spaces = spaces.all(engine)?;
         drop(library);
 
-        // Tiles near robots once more; then all points.
+        // Tiles near robots are read again; then all points.
         let (tiles, clusters) = (&tiles[..], &clusters[..]);
         let plant = ScannedPlant { sources, tiles, store: &store, ground: &ground, clusters };
         let written = self.label(plant, robots.view(), spaces)?;
@@ -123,17 +125,17 @@ impl Run<'_> {
             n_searched: [clusters.len(), regions.len()],
             written: &written,
             review: reviewed.review,
-            left_out: failures.said(job),
+            left_out: failures.messages(job),
         };
         let mut outcome = report.finish(output)?;
-        outcome.told = self.conclude(plant, robots.fits, &written, &outcome)?;
+        outcome.notes = self.conclude(plant, robots.fits, &written, &outcome)?;
         output.prune(tiles, &[&ground_kept, &fits_kept], &models_kept);
         let n_kept = [models_kept.n_kept(), input_tiles.n_kept(), fits_kept.n_kept()];
         outcome.reused = cache::reused_in_words(["models", "tiles", "fits"], n_kept);
         Ok(outcome)
     }
 
-    /// Reads library and review, opens the scans, and sees that disk and memory are enough.
+    /// Reads library and review, opens the scans, and checks disk and memory.
     fn open(&self, models_kept: &Cache) -> Result<Opened> {
         let &Run { job, settings, output, digests, engine } = self;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
@@ -145,16 +147,15 @@ impl Run<'_> {
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         let has_tiles = |i: &Input| {
-            let key = digests.tiles(i, &sources.scans, settings);
+            let key = digests.tiles_key(i, &sources.scans, settings);
             key.is_some_and(|key| output.has_tiles(&key))
         };
         Estimate::of(job, &sources, library.models.len(), has_tiles).checked(output.out())?;
         Ok(Opened { library, review, sources })
     }
 
-    /// Of all fits those that can stand together, with tools on their flanges, their joints
-    /// calibrated where that is asked for, and agreed on how far the scans are off; all as far
-    /// as the review lets them.
+    /// Chooses compatible fits, adds tools, calibrates joints on request, estimates the
+    /// registration error of each scan, and applies the review.
     fn robots(
         &self,
         found: Vec<Fit>,
@@ -176,13 +177,12 @@ impl Run<'_> {
             let (scans, still) = (&opened.sources.scans, &ground.surfaces.overlaps);
             fit::together(&mut fits, &models, scans, still, &settings.fit);
         }
-        let review = review.did(&without, &fits, &wrong);
+        let review = review.effects(&without, &fits, &wrong);
         Ok(ReviewedRobots { robots: RobotList { fits, models }, review })
     }
 
-    /// Which points near robots are links, and which hang on them; then the second pass: every
-    /// point once more, in the order of its file, to label and to write, with what nobody saw
-    /// around the robots.
+    /// Labels points near robots as links or attached bodies; then the second pass labels and
+    /// writes every point in the order of its file, and the known space around the robots.
     fn label(
         &self,
         plant: ScannedPlant<'_>,
@@ -204,8 +204,8 @@ impl Run<'_> {
         Ok(written)
     }
 
-    /// All is whole, and of the inputs that the run began with: it takes the place of what was
-    /// there; what was taken away beside it, in words.
+    /// Publishes the complete result after a check that the inputs are unchanged. Returns messages
+    /// about files that were removed beside it.
     fn conclude(
         &self,
         plant: ScannedPlant<'_>,

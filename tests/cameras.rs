@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::f64::consts::PI;
 use std::path::PathBuf;
 use stillpoint::engine::Engine;
-use stillpoint::job::{Given, Job, Means};
+use stillpoint::job::{FlagValues, Job, Means};
 use stillpoint::plan;
 
 /// Error of a base that clouds bent by 5 to 8 mm allow, metres.
@@ -50,8 +50,8 @@ fn an_arm_in_a_depth_cameras_view_is_found_and_not_trusted() {
         let position = &scene["scanner_position_world"];
         std::fs::write(&scanners, format!("[[scanner]]\nposition = {position}\n"))
             .expect("written");
-        let means =
-            Means::of(&Given { threads: Some(2), ..Given::default() }).expect("defaults hold");
+        let means = Means::of(&FlagValues { threads: Some(2), ..FlagValues::default() })
+            .expect("defaults hold");
         let input = clouds.join(frame["file"].as_str().expect("a name"));
         let out = dir.path().join("out");
         let job =

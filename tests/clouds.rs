@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use stillpoint::engine::Engine;
 use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
-use stillpoint::job::{Given, Job, Means, Outcome};
+use stillpoint::job::{FlagValues, Job, Means, Outcome};
 use stillpoint::plan;
 
 /// A hall with things that stand before its walls, and three scanners whose beams are 0.6° apart:
@@ -90,7 +90,8 @@ fn run(
     robots: PathBuf,
     out: PathBuf,
 ) -> contract::Result<Outcome> {
-    let means = Means::of(&Given { threads: Some(2), ..Given::default() }).expect("defaults hold");
+    let means = Means::of(&FlagValues { threads: Some(2), ..FlagValues::default() })
+        .expect("defaults hold");
     let job = Job { scanners, ..Job::new(vec![input], robots, out, means) };
     plan::run(&job, &Engine::new(2))
 }

@@ -8,7 +8,7 @@ use stillpoint::cache::check;
 use stillpoint::engine::Engine;
 use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
-use stillpoint::job::{Given, Job, Means, Outcome};
+use stillpoint::job::{FlagValues, Job, Means, Outcome};
 use stillpoint::plan;
 use stillpoint::rescan::{Cell, Frame, RescanRequest, rescan};
 
@@ -66,7 +66,7 @@ impl Plant {
     }
 
     fn job(&self, input: &str, out: &str) -> Job {
-        let means = Means::of(&Given::default()).expect("it can be set");
+        let means = Means::of(&FlagValues::default()).expect("it can be set");
         Job::new(vec![self.path(input)], self.path("robots"), self.path(out), means)
     }
 

@@ -6,7 +6,7 @@ use stillpoint::engine::Engine;
 use stillpoint::eval::compare::Agreement;
 use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
-use stillpoint::job::{Given, Job, Means};
+use stillpoint::job::{FlagValues, Job, Means};
 use stillpoint::plan;
 
 const SEED: u64 = 5;
@@ -34,7 +34,7 @@ fn a_robot_that_moved_between_stations_has_two_postures() {
     scan_scene(&scene, &models, &scans, Formats { las: false, ..Formats::ALL }, &Engine::new(2))
         .expect("scans");
     let out = dir.path().join("out");
-    let means = Means::of(&Given::default()).expect("defaults hold");
+    let means = Means::of(&FlagValues::default()).expect("defaults hold");
     let inputs = vec![scans.join("scans.e57")];
     let job = Job::new(inputs, robots, out.clone(), means);
     plan::run(&job, &Engine::new(2)).expect("the run ends well");

@@ -10,7 +10,7 @@ use stillpoint::engine::Engine;
 use stillpoint::eval::compare::Agreement;
 use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
-use stillpoint::job::{Given, Job, Means};
+use stillpoint::job::{FlagValues, Job, Means};
 use stillpoint::plan;
 use stillpoint::rescan::{Cell, Frame, RescanRequest, rescan};
 
@@ -59,7 +59,7 @@ impl Plant {
     }
 
     fn job(&self, scans: &str, out: &str) -> Job {
-        let given = Given { set: vec!["export.copc=true".into()], ..Given::default() };
+        let given = FlagValues { set: vec!["export.copc=true".into()], ..FlagValues::default() };
         let means = Means::of(&given).expect("it can be set");
         let inputs = vec![self.path(scans).join("scans.e57")];
         Job::new(inputs, self.path("robots"), self.path(out), means)

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stillpoint::check;
 use stillpoint::engine::Engine;
-use stillpoint::job::{Given, Job, Means};
+use stillpoint::job::{FlagValues, Job, Means};
 use stillpoint::rescan::{Cell, Frame, RescanRequest, rescan};
 use stillpoint::result::conversion::{Format, convert};
 use stillpoint::result::history;
@@ -113,7 +113,7 @@ impl Plant {
 
     fn means() -> Means {
         let set = ["export.copc=true", "export.tile_edge=3.0"].map(String::from).to_vec();
-        Means::of(&Given { set, ..Given::default() }).expect("it can be set")
+        Means::of(&FlagValues { set, ..FlagValues::default() }).expect("it can be set")
     }
 
     fn job(&self, scans: &str, out: &str) -> Job {
@@ -402,9 +402,9 @@ fn folders_that_lead_elsewhere(plant: &Plant) {
     let export = plant.at("out/export/fixed.ply");
     assert!(export.is_file());
     std::fs::remove_dir_all(plant.at("out/pictures")).expect("goes");
-    let told = plan::run(&plant.job("then", "out"), &engine).expect("the run ends well").told;
+    let told = plan::run(&plant.job("then", "out"), &engine).expect("the run ends well").notes;
     assert!(told.is_empty() && export.is_file(), "{told:?}");
-    let told = plan::run(&plant.job("now", "out"), &engine).expect("the run ends well").told;
+    let told = plan::run(&plant.job("now", "out"), &engine).expect("the run ends well").notes;
     assert!(told.iter().any(|t| t.contains("fixed.ply")) && !export.exists(), "{told:?}");
 
     // The last session goes as others do.

@@ -8,7 +8,7 @@ use stillpoint::estimate::estimate;
 use stillpoint::eval::compare::Agreement;
 use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
-use stillpoint::job::{Given, Job, Means};
+use stillpoint::job::{FlagValues, Job, Means};
 use stillpoint::plan;
 
 /// Beams of each of the six scanners: about 30 mm apart at 5 m, an eighth of what a crew would
@@ -39,7 +39,7 @@ fn scene(dir: &Path) -> PathBuf {
 }
 
 fn run(input: PathBuf, scanners: Option<PathBuf>, robots: &Path, out: PathBuf, threads: usize) {
-    let given = Given { threads: Some(threads), ..Given::default() };
+    let given = FlagValues { threads: Some(threads), ..FlagValues::default() };
     let means = Means::of(&given).expect("defaults hold");
     let robots = robots.to_path_buf();
     let job = Job { scanners, ..Job::new(vec![input], robots, out, means) };

@@ -1,5 +1,4 @@
-//! A job in; digests of all files that it reads, and keys of the pieces that are made from them,
-//! out.
+//! Digests of all files that a run reads, and the keys of the pieces that are computed from them.
 
 use super::file_digests::{Algorithm, FileDigests, Pace, Stamp};
 use super::key::Key;
@@ -14,24 +13,24 @@ use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Digests of all that a run reads.
+/// Digests of all files that a run reads.
 pub(crate) struct Digests {
     contents: FileDigests,
-    /// Of each input; one that nobody has ever read gets its digest while it is decoded.
+    /// Digest of each input; that of a new input is set when it is decoded.
     inputs: Vec<OnceLock<String>>,
-    /// Places of inputs, and what they were before anything of them was read.
+    /// Paths of the inputs, and their stamps from before anything of them was read.
     files: Vec<(PathBuf, Stamp)>,
     library: String,
     others: String,
-    /// Number of the first input: those before it were read by an earlier run.
+    /// Number of the first input; inputs before it were read by an earlier run.
     first: usize,
-    /// Digest of the result that this run goes on from, and what is asked of it.
+    /// Digest of the earlier result that this run starts from, and of the arguments of the rescan.
     base: String,
 }
 
 impl Digests {
-    /// Reads every file of the job once, except those that are known and unchanged since, and
-    /// inputs that are new.
+    /// Reads every file of the job once, except files that are known and unchanged, and new inputs,
+    /// which are digested while they are decoded.
     pub(crate) fn of(job: &Job, output: &OutputDir, engine: &Engine) -> Result<Self> {
         let contents = FileDigests::open(output.store());
         let stamped = |path: &PathBuf| Ok((path.clone(), Stamp::of(path)?));
@@ -55,7 +54,8 @@ impl Digests {
         Ok(Self { contents, inputs, files, library, others, first: 0, base })
     }
 
-    /// The same for a run that goes on from a result with this digest, and so many inputs.
+    /// The same digests for a run that starts from a result with the digest `base` and `first`
+    /// inputs.
     #[must_use]
     pub(crate) fn after(self, first: usize, base: String) -> Self {
         Self { first, base, ..self }
@@ -65,13 +65,12 @@ impl Digests {
         input.id.0 as usize - self.first
     }
 
-    /// Digest of an input's bytes, where it is known yet.
+    /// Digest of an input's bytes; `None` while it is not known.
     pub(crate) fn input(&self, input: &Input) -> Option<&str> {
         self.inputs[self.at(input)].get().map(String::as_str)
     }
 
-    /// Reads an input whose digest is not known, beside the one who decodes it and tells how far he
-    /// is.
+    /// Reads an input to compute its digest, at the pace of the thread that decodes it.
     pub(crate) fn read(&self, input: &Input, pace: &Pace) -> Result<()> {
         let at = self.at(input);
         let digest = self.contents.read(&self.files[at].0, Algorithm::Blake3, pace)?;
@@ -79,38 +78,39 @@ impl Digests {
         self.contents.keep()
     }
 
-    /// The tree of an input whose digest is not known, for who reads it in pieces.
+    /// The hash tree for an input whose digest is not known and that is read in pieces.
     pub(crate) fn tree(&self, input: &Input) -> Option<HashTree> {
         self.input(input).is_none().then(|| HashTree::new(self.files[self.at(input)].1.n_bytes()))
     }
 
-    /// Takes what an input came to that was read in pieces.
+    /// Sets the digest of an input that was read in pieces.
     pub(crate) fn take(&self, input: &Input, tree: HashTree) -> Result<()> {
         let at = self.at(input);
         let (path, stamp) = &self.files[at];
-        let digest =
-            tree.finish().ok_or_else(|| Error::new(Kind::Bug, "a file was not summed up"))?;
+        let digest = tree.finish().ok_or_else(|| {
+            Error::new(Kind::Bug, "an input was read in pieces, but not all of them were digested")
+        })?;
         let digest = Algorithm::Blake3.word(&digest.to_hex());
         self.contents.take(path, *stamp, &digest)?;
         let _ = self.inputs[at].set(digest);
         self.contents.keep()
     }
 
-    /// Refuses an input that is not the one any more that the run began with: what was read of it
-    /// may be of either.
+    /// Refuses an input that was changed since the run began: what was read of it may mix both
+    /// versions.
     pub(crate) fn check(&self, input: &Input) -> Result<()> {
         let (path, stamp) = &self.files[self.at(input)];
         stamp.check(path)
     }
 
-    /// The list of an earlier run, if it was of the same job and its files are what they were.
+    /// The manifest of an earlier run, if that run had the same job and its files are unchanged.
     pub(crate) fn unchanged(&self, job: &Job, output: &OutputDir) -> Result<Option<Manifest>> {
-        let key = self.whole(job);
+        let key = self.result_key(job);
         key.map_or(Ok(None), |key| manifest::unchanged(&self.contents, output.out(), &key))
     }
 
-    /// Remembers outputs as they were written, so that the next run need not read them to see that
-    /// nothing has changed.
+    /// Records stamps and digests of the outputs, so that the next run can tell that they are
+    /// unchanged without reading them.
     pub(crate) fn remember(&self, manifest: &Manifest, out: &Path) -> Result<()> {
         for file in &manifest.files {
             self.contents.believe(&out.join(&file.path), &file.digest)?;
@@ -118,35 +118,40 @@ impl Digests {
         self.contents.keep()
     }
 
-    /// The tiles of one input, where its digest is known yet.
-    pub(crate) fn tiles(&self, input: &Input, scans: &[Scan], settings: &Settings) -> Option<Key> {
+    /// Key of the tiles of one input; `None` while its digest is not known.
+    pub(crate) fn tiles_key(
+        &self,
+        input: &Input,
+        scans: &[Scan],
+        settings: &Settings,
+    ) -> Option<Key> {
         let own = scans.iter().filter(|s| s.input == input.id);
         let own = own.map(|s| words(&(s.source_id, s.world_from_scan, s.lattice)));
         let own: Vec<String> = own.collect();
         Some(Key::of("tiles", &[self.input(input)?, &own.join("\n"), &words(&settings.ingest)]))
     }
 
-    /// Floor, planes and occupied space of a plant whose tiles have these names.
-    pub(crate) fn ground(&self, tiles: &[Key], settings: &Settings) -> Key {
+    /// Key of floor, planes and occupied space of a plant with these tiles.
+    pub(crate) fn ground_key(&self, tiles: &[Key], settings: &Settings) -> Key {
         Key::of("ground", &[&words(&tiles), &words(&(&settings.lattice, &settings.floor))])
     }
 
-    /// Fits of the regions of a plant whose tiles have these names.
-    pub(crate) fn fits(&self, tiles: &[Key], settings: &Settings) -> Key {
+    /// Key of the fits of all regions of a plant with these tiles.
+    pub(crate) fn fits_key(&self, tiles: &[Key], settings: &Settings) -> Key {
         let s = settings;
         let ground = words(&(&s.lattice, &s.floor, &s.cluster, &s.region));
         let search = words(&(&s.view, &s.base_search, &s.method, &s.fit, &s.paper, &s.robot));
         Key::of("fits", &[&words(&tiles), &self.library, &ground, &search])
     }
 
-    /// Models of the library, as they are loaded with these settings.
-    pub(crate) fn models(&self, settings: &Settings) -> Key {
+    /// Key of the models of the library as they are loaded with these settings.
+    pub(crate) fn models_key(&self, settings: &Settings) -> Key {
         Key::of("models", &[&self.library, &words(&settings.robot)])
     }
 
-    /// All that a job writes, where the digests of all inputs are known yet. Names of files are
-    /// part of it: results name their inputs.
-    pub(crate) fn whole(&self, job: &Job) -> Option<Key> {
+    /// Key of the whole result of a job; `None` while an input's digest is not known. File names
+    /// are part of it, since results name their inputs.
+    pub(crate) fn result_key(&self, job: &Job) -> Option<Key> {
         let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
         let digests: Option<Vec<&String>> = self.inputs.iter().map(OnceLock::get).collect();
         let inputs = words(&(&names, digests?));
@@ -155,7 +160,7 @@ impl Digests {
     }
 }
 
-/// Values as they print: floats print so that they read back the same.
+/// Values in debug format, in which floats read back to the same bits.
 fn words(value: &impl Debug) -> String {
     format!("{value:?}")
 }

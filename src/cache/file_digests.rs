@@ -1,5 +1,5 @@
-//! Files in, digests of their bytes out. A file that was read before and has since kept its length,
-//! time and place on disk is not read again.
+//! Digests of files. A file whose length, modification time and inode are those of an earlier run
+//! is not read again.
 
 use contract::{Error, Kind, Result};
 use export::atomic;
@@ -12,41 +12,43 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
-/// Name of the list in the store.
+/// Name of the list of known digests in the store.
 const LIST: &str = "contents.json";
-/// Bytes that are read at a time.
+/// Number of bytes that are read at a time.
 const PIECE: usize = 1 << 20;
-/// How far a file may be read ahead of the one that decodes it, bytes: the system still has it in
-/// memory then.
+/// Most bytes by which digesting may run ahead of decoding, so that the file is still in the page
+/// cache.
 const AHEAD: u64 = 256 << 20;
-/// A file that changed so recently may change again without its time telling.
+/// Age below which a modification time is not trusted: the file could change again without a change
+/// of its time.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// What the system says of a file: as long as that stays, so do its bytes.
+/// Length, modification time and inode of a file. While these stay, its bytes are taken to be
+/// unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Stamp {
     n_bytes: u64,
-    /// Time of its last change, nanoseconds since 1970.
+    /// Modification time, nanoseconds since 1970.
     changed: u128,
-    /// Its number on its disk, where it has one.
+    /// Inode number, 0 where the system has none.
     number: u64,
 }
 
-/// A file that was read.
+/// Stamp and digest of a file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct KnownFile {
     stamp: Stamp,
     digest: String,
 }
 
-/// Digests that are known.
+/// All known digests of files.
 pub(super) struct FileDigests {
     list: PathBuf,
     seen: Mutex<BTreeMap<String, KnownFile>>,
 }
 
 impl FileDigests {
-    /// What an earlier run left in the store; nothing where it left nothing that can be read.
+    /// Opens the list that an earlier run left in the store; an unreadable list counts as empty.
     pub(super) fn open(store: &Path) -> Self {
         let list = store.join(LIST);
         let text = std::fs::read_to_string(&list).unwrap_or_default();
@@ -54,15 +56,16 @@ impl FileDigests {
         Self { list, seen: Mutex::new(seen) }
     }
 
-    /// Writes what is known for the next run.
+    /// Writes the list for the next run.
     pub(super) fn keep(&self) -> Result<()> {
         let seen = self.seen.lock().expect("no thread panics while it holds the list");
-        let text = serde_json::to_string_pretty(&*seen)
-            .map_err(|e| Error::new(Kind::Bug, "a list cannot be written").because(e))?;
+        let text = serde_json::to_string_pretty(&*seen).map_err(|e| {
+            Error::new(Kind::Bug, "the list of known digests cannot be encoded").because(e)
+        })?;
         atomic::write(&self.list, text.as_bytes())
     }
 
-    /// The digest of a file, read where it is not known.
+    /// The digest of a file, which is read unless it is known.
     pub(super) fn digest(&self, path: &Path, algorithm: Algorithm) -> Result<String> {
         match self.known(path, algorithm)? {
             Some(digest) => Ok(digest),
@@ -70,14 +73,14 @@ impl FileDigests {
         }
     }
 
-    /// Takes the word of the one who wrote a file.
+    /// Records the digest of a file that this program has written.
     pub(super) fn believe(&self, path: &Path, digest: &str) -> Result<()> {
         let seen = KnownFile { stamp: Stamp::of(path)?, digest: digest.to_owned() };
         self.lock().insert(name(path)?, seen);
         Ok(())
     }
 
-    /// The digest of a file that has not changed since it was read.
+    /// The digest of a file that is unchanged since it was read; `None` for other files.
     pub(super) fn known(&self, path: &Path, algorithm: Algorithm) -> Result<Option<String>> {
         let stamp = Stamp::of(path)?;
         let is_known =
@@ -85,14 +88,14 @@ impl FileDigests {
         Ok(self.lock().get(&name(path)?).filter(is_known).map(|s| s.digest.clone()))
     }
 
-    /// Whether a file may be one that was read before, under another name or time: it has the
-    /// length of one.
+    /// Whether a file has the length of a known one, and so may be that file under another name or
+    /// time.
     pub(super) fn may_know(&self, path: &Path) -> Result<bool> {
         let n_bytes = Stamp::of(path)?.n_bytes;
         Ok(self.lock().values().any(|s| s.stamp.n_bytes == n_bytes))
     }
 
-    /// Reads a file, not faster than `pace` allows.
+    /// Reads a file to compute its digest, not faster than `pace` allows.
     pub(super) fn read(&self, path: &Path, algorithm: Algorithm, pace: &Pace) -> Result<String> {
         let stamp = Stamp::of(path)?;
         let digest = algorithm.of_file(path, pace)?;
@@ -100,7 +103,7 @@ impl FileDigests {
         Ok(digest)
     }
 
-    /// Takes the digest of a file that was read since it had this stamp; refuses one that was
+    /// Records the digest of a file that had this stamp before it was read; refuses a file that was
     /// changed meanwhile.
     pub(super) fn take(&self, path: &Path, stamp: Stamp, digest: &str) -> Result<()> {
         stamp.check(path)?;
@@ -110,9 +113,9 @@ impl FileDigests {
         Ok(())
     }
 
-    /// Digest of names and bytes of all files below a folder, in the order of their names. Of links
-    /// it holds where they lead: what lies in the folder is in it by itself, and what lies
-    /// elsewhere is not read.
+    /// Digest of names and bytes of all files in a folder, in the order of their names. For a
+    /// symbolic link only its target path is digested: a target in the folder is digested by
+    /// itself, and one elsewhere is not read.
     pub(super) fn folder(&self, folder: &Path) -> Result<String> {
         let mut files = Vec::new();
         walk(folder, &mut files)?;
@@ -141,38 +144,38 @@ impl Stamp {
         Ok(Self { n_bytes: meta.len(), changed: changed(&meta), number: number(&meta) })
     }
 
-    /// Length of the file.
+    /// Length of the file, bytes.
     pub(super) fn n_bytes(&self) -> u64 {
         self.n_bytes
     }
 
-    /// Refuses a file that is not what it was.
+    /// Refuses a file whose stamp has changed.
     pub(super) fn check(&self, path: &Path) -> Result<()> {
         if Self::of(path)? == *self {
             return Ok(());
         }
-        let error = Error::bad_input("the file was changed while it was read");
-        Err(error.at(path.display()).hint("start again when it is complete"))
+        let error = Error::bad_input("the file was changed while the run read it");
+        Err(error.at(path.display()).hint("start the run again once the file is complete"))
     }
 
-    /// Whether its last change is so long ago that a later one would show.
+    /// Whether its modification time is old enough that a later change would alter it.
     fn is_settled(&self) -> bool {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         now.is_ok_and(|now| now.as_nanos() > self.changed + SETTLED.as_nanos())
     }
 }
 
-/// How the bytes of a file are summed up.
+/// Algorithm of a checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Algorithm {
-    /// Names contents: no two files share it.
+    /// BLAKE3: identifies contents.
     Blake3,
-    /// Tells damage: what is written bit by bit can be summed bit by bit.
+    /// CRC-32C: detects damage, and can be computed of files that are written piece by piece.
     Crc32c,
 }
 
 impl Algorithm {
-    /// The kind of a digest as [`Algorithm::word`] writes it.
+    /// The algorithm of a digest that [`Algorithm::word`] wrote.
     pub(super) fn of(digest: &str) -> Option<Self> {
         [Self::Blake3, Self::Crc32c]
             .into_iter()
@@ -186,12 +189,12 @@ impl Algorithm {
         }
     }
 
-    /// A digest with its kind.
+    /// A digest with the name of its algorithm before it.
     pub(super) fn word(self, digits: &str) -> String {
         format!("{}{digits}", self.name())
     }
 
-    /// Of bytes in memory.
+    /// Digest of bytes in memory.
     pub(super) fn of_bytes(self, bytes: &[u8]) -> String {
         match self {
             Self::Blake3 => self.word(&blake3::hash(bytes).to_hex()),
@@ -199,7 +202,7 @@ impl Algorithm {
         }
     }
 
-    /// Reads a file.
+    /// Digest of a file.
     pub(super) fn read(self, path: &Path) -> Result<String> {
         self.of_file(path, &Pace::default())
     }
@@ -230,41 +233,47 @@ impl Algorithm {
     }
 }
 
-/// Where a file is known by.
+/// The key of a file in the list: its canonical path.
 fn name(path: &Path) -> Result<String> {
     let absolute = std::path::absolute(path).map_err(|e| Error::from(e).at(path.display()))?;
     Ok(absolute.display().to_string())
 }
 
-/// How far the one who decodes a file has come, for another who sums it up: both read it from disk
-/// only once if they stay near each other.
+/// Progress of the thread that decodes a file, for the thread that digests it. Both read the file
+/// from disk only once if they stay close together.
 #[derive(Debug, Default)]
 pub(crate) struct Pace {
-    /// Points that are decoded, and how many there are; no pace where that is 0.
+    /// Number of decoded points, and of all points; without a known total there is no pace.
     done: AtomicU64,
     all: u64,
-    /// There is nothing to keep pace with: 1 all is decoded, 2 it was given up.
+    /// Why the pace has ended: 1, all points are decoded; 2, decoding failed.
     end: AtomicU8,
 }
 
 impl Pace {
-    /// For a file of so many points, 0 where that is not known.
+    /// The pace of a file with `all` points; 0 where the number is not known.
     pub(crate) fn of(all: u64) -> Self {
         Self { all, ..Self::default() }
     }
 
-    /// Of the one who decodes. Where it goes without having ended, the other one gives up.
+    /// The handle of the decoding thread. If it is dropped before its end, the digesting thread
+    /// gives up.
     pub(crate) fn lead(&self) -> Lead<'_> {
         Lead(self)
     }
 
-    /// Waits for its turn to read on from `at`.
+    /// Waits until the bytes from `at` on may be read.
     fn wait(&self, at: u64, n_bytes: u64) -> Result<()> {
         loop {
             let share = self.done.load(Ordering::Relaxed) as f64 / self.all.max(1) as f64;
             let is_near = at <= (share * n_bytes as f64) as u64 + AHEAD;
             match self.end.load(Ordering::Relaxed) {
-                2 => return Err(Error::new(Kind::Cancelled, "a file is no longer wanted")),
+                2 => {
+                    return Err(Error::new(
+                        Kind::Cancelled,
+                        "the digest of a file is no longer needed, since decoding it has failed",
+                    ));
+                }
                 0 if self.all > 0 && !is_near => std::thread::sleep(Duration::from_millis(1)),
                 _ => return Ok(()),
             }
@@ -272,7 +281,7 @@ impl Pace {
     }
 }
 
-/// The one who sets the pace.
+/// Handle of the thread that sets the pace.
 pub(crate) struct Lead<'a>(&'a Pace);
 
 impl Lead<'_> {
@@ -287,12 +296,12 @@ impl Lead<'_> {
 
 impl Drop for Lead<'_> {
     fn drop(&mut self) {
-        // After the end nothing changes any more.
+        // The first of end and failure counts.
         let _ = self.0.end.compare_exchange(0, 2, Ordering::Relaxed, Ordering::Relaxed);
     }
 }
 
-/// Time of the last change, nanoseconds since 1970; zero where the system does not tell.
+/// Modification time, nanoseconds since 1970; zero where the system does not state it.
 fn changed(meta: &Metadata) -> u128 {
     let since = meta.modified().ok().and_then(|at| at.duration_since(SystemTime::UNIX_EPOCH).ok());
     since.map_or(0, |since| since.as_nanos())
@@ -308,7 +317,7 @@ fn number(_: &Metadata) -> u64 {
     0
 }
 
-/// All files and links below a folder; links are not followed.
+/// Collects all files and symbolic links in a folder and its subfolders; links are not followed.
 pub(super) fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     let failed = |e: std::io::Error| Error::from(e).at(folder.display());
     for entry in std::fs::read_dir(folder).map_err(failed)? {
@@ -338,12 +347,12 @@ mod tests {
         let contents = FileDigests::open(dir.path());
         let one = contents.digest(&path, Algorithm::Blake3).expect("reads");
         contents.keep().expect("writes");
-        // Another content under the same length, time and number: believed, not read.
+        // With the same length, time and inode the file counts as unchanged and is not read.
         std::fs::write(&path, b"two").expect("writes");
         set(old).expect("a time");
         let again = FileDigests::open(dir.path());
         assert_eq!(again.digest(&path, Algorithm::Blake3).expect("reads"), one);
-        // Its time tells: read again.
+        // A changed time makes it be read again.
         set(old + Duration::from_secs(1)).expect("a time");
         assert_ne!(again.digest(&path, Algorithm::Blake3).expect("reads"), one);
         assert!(contents.digest(&dir.path().join("none"), Algorithm::Blake3).is_err());
@@ -353,7 +362,7 @@ mod tests {
     fn who_sums_up_keeps_near_who_decodes_and_gives_up_with_him() {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("scan.las");
-        // Longer than anyone may be ahead; takes no room.
+        // A sparse file that is longer than the digesting thread may run ahead.
         File::create(&path).and_then(|f| f.set_len(AHEAD + (4 << 20))).expect("writes");
         let whole = Algorithm::Crc32c.read(&path).expect("reads");
         let pace = Pace::of(100);
@@ -381,7 +390,7 @@ mod tests {
         let error = stamp.check(&path).expect_err("it is longer");
         assert_eq!(error.kind(), Kind::BadInput);
         assert!(error.to_string().contains("scan.ptx"), "{error}");
-        // The same length and time under another number.
+        // The same length and time with another inode.
         let at = std::fs::metadata(&path).and_then(|m| m.modified()).expect("a time");
         let stamp = Stamp::of(&path).expect("is there");
         std::fs::write(&other, b"two and more").expect("writes");

@@ -1,5 +1,4 @@
-//! An input in, the store of its tiles out: the one that is there from an earlier run, or a new
-//! one.
+//! The store of tiles of each input: that of an earlier run where it is valid, else a new one.
 
 use super::digests::Digests;
 use super::file_digests::Pace;
@@ -13,17 +12,17 @@ use ingest::{Sources, Want};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
-/// Name of a store that is being filled, before the number of its input.
+/// Prefix of the folder of a store that is being filled; the number of its input follows.
 const NEW: &str = "new-";
 
-/// What filling stores takes.
+/// Job, engine and folders for filling the stores of inputs.
 pub(crate) struct InputTiles<'a> {
     sources: &'a Sources,
     means: &'a Means,
-    /// Where stores lie, each in a folder with the name of its key.
+    /// Folder of all stores, each in a subfolder named by its key.
     folder: PathBuf,
     engine: &'a Engine,
-    /// Inputs whose tiles were there, and all that were asked for.
+    /// Number of inputs whose tiles were used again, and of all inputs.
     n_kept: Cell<[usize; 2]>,
 }
 
@@ -37,25 +36,24 @@ impl<'a> InputTiles<'a> {
         Self { sources, means, folder, engine, n_kept: Cell::default() }
     }
 
-    /// Inputs whose tiles were there, of all that were asked for.
+    /// Number of inputs whose tiles were used again, and of all inputs.
     pub(crate) fn n_kept(&self) -> [usize; 2] {
         self.n_kept.get()
     }
 
-    /// The tiles of some inputs: their keys, and one store of all.
+    /// Keys of the tiles of some inputs, and one store of all.
     pub(crate) fn of_all(&self, inputs: &[Input], digests: &Digests) -> Result<(Vec<Key>, Store)> {
         let filled = inputs.iter().map(|input| self.tiles_of(input, digests));
         let (keys, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
         Ok((keys, Store::join(stores)))
     }
 
-    /// The tiles of one input and their key. A store that is there and whole is believed; one that
-    /// is damaged is made again.
+    /// Key and store of one input. A store that opens is used again; a damaged one is made anew.
     fn tiles_of(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
         let scans = &self.sources.scans;
         let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);
         let resident_bytes = self.means.store_bytes() / self.sources.inputs.len().max(1);
-        let key = || digests.tiles(input, scans, &self.means.settings);
+        let key = || digests.tiles_key(input, scans, &self.means.settings);
         let [n_kept, n] = self.n_kept.get();
         self.n_kept.set([n_kept, n + 1]);
         let open = |key: &Key| Store::open(&self.folder.join(key.name()), first, resident_bytes);
@@ -73,7 +71,8 @@ impl<'a> InputTiles<'a> {
         Ok((key.clone(), open(&key)?))
     }
 
-    /// Reads an input into a new store; its digest beside that, if nobody knows it.
+    /// Reads an input into a new store, and digests it at the same time where its digest is not
+    /// known.
     fn fill(
         &self,
         dir: &Path,
@@ -83,7 +82,7 @@ impl<'a> InputTiles<'a> {
         digests: &Digests,
     ) -> Result<()> {
         let scans = &self.sources.scans;
-        // What a run that was cut short has left there would go along for ever.
+        // Files that an interrupted run has left there would stay in the store for ever.
         let _ = std::fs::remove_dir_all(dir);
         let mut sink = TileSink::create(dir, scans, first, self.means.ingest_bytes())?;
         let scatter = Scatter::new(scans);

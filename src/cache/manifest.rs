@@ -1,9 +1,9 @@
-//! What a run has written in, the list of it out (`manifest.json`); and that list again in, what is
-//! missing or changed out.
+//! The manifest of a result (`manifest.json`): the list of all files that a run has written, with
+//! lengths and checksums. A result is published, verified and taken up again by this list.
 //!
-//! Outputs are written beside the old ones and take their places together: the list is the last to
-//! be written there and the last to move, so that a run that is cut short while they move is
-//! finished by the next one.
+//! Outputs are written to a folder beside the old result and moved to their places together. The
+//! manifest is written last and moved last, so that the next run can complete a run that was
+//! interrupted while it moved files.
 
 use super::file_digests::{Algorithm, FileDigests, walk};
 use crate::engine::Engine;
@@ -16,59 +16,60 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Name of the list.
+/// Name of the manifest file.
 pub(super) const LIST: &str = "manifest.json";
-/// The file that vouches for all others: it goes first and comes last.
+/// The main file of a result: the old one is removed first and the new one is moved last, so that
+/// its presence means that the files beside it belong to it.
 pub(super) const RESULT: &str = "result.json";
-/// Where files lie that are made of a result afterwards; the list does not name them.
+/// Folder of files that are converted from a result afterwards; the manifest does not name them.
 pub(crate) const EXPORT: &str = "export";
-/// What the list's format is called.
+/// Name and version of the format.
 const SCHEMA: &str = "stillpoint.manifest/2";
-/// What stands before the digest of all that comes before it, and behind it: the end of the list.
+/// Text before the digest of the manifest and after it.
 const BEFORE_DIGEST: &str = ",\n  \"digest\": \"";
 const BEHIND_DIGEST: &str = "\"\n}";
 
-/// All that a run has written, and what it was made from.
+/// The list of all files of a result, and the key that they were made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Name and version of this format.
     pub schema: String,
     /// Digest of inputs, library, settings and program.
     pub key: String,
-    /// What people read at the end of the run.
+    /// Summary of the run, for people.
     pub summary: String,
-    /// What the run warned of.
+    /// Warnings of the run.
     pub warnings: Vec<String>,
     /// Whether something was skipped or refused.
     pub partial: bool,
-    /// Files but this one, by name.
+    /// All files of the result except the manifest, sorted by name.
     pub files: Vec<OutputFile>,
 }
 
 /// One file of a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OutputFile {
-    /// Relative to the output folder, with `/`.
+    /// Path relative to the output folder, with `/`.
     pub path: String,
-    /// Its length.
+    /// Length, bytes.
     pub n_bytes: u64,
-    /// BLAKE3 of its bytes.
+    /// Checksum of its bytes, with the name of the algorithm.
     pub digest: String,
 }
 
-/// What a look at a result's files finds.
+/// Outcome of verifying the files of a result.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Checked {
-    /// The list.
+pub struct Verification {
+    /// The manifest.
     pub manifest: Manifest,
-    /// Digest of the list: kept elsewhere, it tells a list that was made anew, too.
+    /// Digest of the manifest. A copy kept elsewhere also detects a manifest that was made anew.
     pub digest: String,
-    /// Files that are missing or not what they were, in words.
+    /// Messages about files that are missing or changed.
     pub wrong: Vec<String>,
 }
 
 impl OutputFile {
-    /// A file below `next` whose checksum was taken while it was written.
+    /// The entry of a file in `next` whose checksum was computed while it was written.
     pub(crate) fn of(next: &Path, sum: &FileSum) -> Self {
         let (path, n_bytes) = (name(next, &sum.path), sum.n_bytes);
         Self { path, n_bytes, digest: Algorithm::Crc32c.word(&format!("{:08x}", sum.crc32c)) }
@@ -76,26 +77,27 @@ impl OutputFile {
 }
 
 impl Manifest {
-    /// The list of an output folder.
+    /// Reads the manifest of an output folder.
     ///
     /// # Errors
-    /// There is none, it is not what was written, or it names what is no file of a result.
+    /// There is no manifest, it was changed, or it names a file that is not part of a result.
     pub fn read(out: &Path) -> Result<Self> {
         Self::read_with_digest(out).map(|(manifest, _)| manifest)
     }
 
-    /// The same, with the digest of the list: it names every byte of the result.
+    /// Like [`Manifest::read`], with the digest of the manifest, which covers every byte of the
+    /// result.
     pub(super) fn read_with_digest(out: &Path) -> Result<(Self, String)> {
         let path = without_links(out, LIST)?;
         let text = std::fs::read_to_string(&path).map_err(|e| {
             let hint = "give the --out folder of a run that has ended";
-            Error::bad_input("this is no result: it has no list of its files")
+            Error::bad_input("this folder is not a result: it has no list of its files")
                 .because(e)
                 .hint(hint)
                 .at(path.display())
         })?;
         let broken = |what: &str| Error::bad_input(what.to_owned()).at(path.display());
-        let anew = "run the same job again; `stillpoint verify` works by this list";
+        let anew = "run the same job again; `stillpoint verify` needs this list";
         let manifest: Self = serde_json::from_str(&text)
             .map_err(|e| broken("the list of files cannot be read").because(e).hint(anew))?;
         if manifest.schema != SCHEMA {
@@ -105,24 +107,25 @@ impl Manifest {
             end.strip_suffix(BEHIND_DIGEST) == Some(&*Algorithm::Blake3.of_bytes(body.as_bytes()))
         });
         if !is_whole {
-            let what = "the list of files is not what was written: its digest is another";
+            let what = "the list of files was changed: its digest does not match";
             return Err(broken(what).hint(anew));
         }
         match manifest.files.iter().find(|file| !is_own(&file.path)) {
             None => Ok((manifest, Algorithm::Blake3.of_bytes(text.as_bytes()))),
             Some(file) => {
-                Err(broken("the list names what is no file of a result").because(&*file.path))
+                Err(broken("the list of files names a file that no result has")
+                    .because(&*file.path))
             }
         }
     }
 
-    /// Whether a list lies in a folder, whole or not.
+    /// Whether a folder contains a manifest, valid or not.
     pub(crate) fn is_beside(out: &Path) -> bool {
         out.join(LIST).symlink_metadata().is_ok_and(|meta| meta.is_file())
     }
 
-    /// Files that the list of an output folder names, if there is a list, whatever version wrote
-    /// it: those that a result has.
+    /// The files of a result that the manifest of an output folder names, whatever version wrote
+    /// it; empty without a manifest.
     fn named(out: &Path) -> Vec<OutputFile> {
         let text = without_links(out, LIST).ok().and_then(|path| std::fs::read(path).ok());
         let manifest = text.and_then(|text| serde_json::from_slice::<Self>(&text).ok());
@@ -131,8 +134,8 @@ impl Manifest {
         files
     }
 
-    /// Lists what lies in `next`, files that are known as they are `known`, and writes the list
-    /// there.
+    /// Lists the files in `next`, with the checksums in `known` where they are given, and writes
+    /// the manifest there.
     pub(crate) fn write(
         next: &Path,
         key: Option<super::Key>,
@@ -164,17 +167,17 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Moves what lies in `next`, as its list says, to `out`, and takes away what only the old list
-    /// of `out` names. May be cut short anywhere and done again. Beside the list: what was made
-    /// of the old result and is true no longer, in words.
+    /// Moves the files in `next` to `out` as the manifest lists them, and removes files that only
+    /// the old manifest of `out` names. It may be interrupted anywhere and repeated. Returns the
+    /// manifest and messages about files that were converted from the old result and were removed.
     pub(crate) fn publish(next: &Path, out: &Path) -> Result<(Self, Vec<String>)> {
         let manifest = Self::read(next)?;
         let old = Self::named(out);
-        // Nothing is moved or taken away through a link.
+        // No file is moved or removed through a symbolic link.
         for file in manifest.files.iter().chain(&old) {
             without_links(out, &file.path)?;
         }
-        // Where it has moved already, all but the list has: a run was cut short between the two.
+        // If `result.json` has moved already, a run was interrupted before it moved the manifest.
         if next.join(RESULT).exists() {
             remove(&out.join(RESULT))?;
         }
@@ -191,17 +194,18 @@ impl Manifest {
             if same_points(&old, &manifest.files) { Vec::new() } else { forget_exports(out) };
         shift(&next.join(RESULT), &out.join(RESULT))?;
         shift(&next.join(LIST), &out.join(LIST))?;
-        // Empty folders; where they stay the next run takes them away.
+        // Only empty folders are left; the next run removes them if this fails.
         let _ = std::fs::remove_dir_all(next);
         Ok((manifest, told))
     }
 
-    /// Whether a whole list lies in `next`: all of it is written, and some of it may have moved.
+    /// Whether `next` contains a valid manifest: then all files are written, and some may have
+    /// moved.
     pub(crate) fn waits(next: &Path) -> bool {
         Self::read(next).is_ok()
     }
 
-    /// The outcome of the run that wrote it.
+    /// The outcome of the run that wrote the manifest.
     pub(crate) fn outcome(&self) -> Outcome {
         Outcome {
             summary: self.summary.clone(),
@@ -210,12 +214,12 @@ impl Manifest {
             reused: vec![
                 "everything: neither inputs, library, settings nor program have changed".into(),
             ],
-            told: Vec::new(),
+            notes: Vec::new(),
         }
     }
 }
 
-/// A list in JSON with its own digest behind all else.
+/// A manifest in JSON with its own digest appended as the last field.
 pub(crate) fn sealed(text: &str) -> String {
     let text = text.trim_end();
     let body = text.strip_suffix('}').unwrap_or(text).trim_end();
@@ -223,7 +227,8 @@ pub(crate) fn sealed(text: &str) -> String {
     format!("{body}{BEFORE_DIGEST}{digest}{BEHIND_DIGEST}")
 }
 
-/// Whether two results have the same tiles: what was made of their points is true of both.
+/// Whether two results have the same tiles, so that files converted from one are valid for the
+/// other.
 fn same_points(old: &[OutputFile], new: &[OutputFile]) -> bool {
     let tiles = |files: &[OutputFile]| -> BTreeSet<(String, String)> {
         let tiles = files.iter().filter(|file| file.path.starts_with("tiles/"));
@@ -232,9 +237,9 @@ fn same_points(old: &[OutputFile], new: &[OutputFile]) -> bool {
     tiles(old) == tiles(new)
 }
 
-/// Takes away what was made of the result that was there, and says so; nothing else that lies
-/// beside it. What cannot be taken away must not keep a result that is whole from its place, and is
-/// named, too.
+/// Removes files that were converted from the earlier result, but nothing else beside it, and
+/// returns a message for each. A file that cannot be removed is named, too, and does not prevent
+/// the new result from being published.
 fn forget_exports(out: &Path) -> Vec<String> {
     let mut told = Vec::new();
     for name in export_names() {
@@ -245,7 +250,8 @@ fn forget_exports(out: &Path) -> Vec<String> {
             Err(_) => "is to be taken away",
         };
         told.push(format!(
-            "{} {went}: it was made of the points of the earlier result, and these are others; `stillpoint export` makes it anew",
+            "{} {went}: it was converted from the points of the earlier result, which have changed; \
+                 `stillpoint export` makes it again",
             path.display()
         ));
     }
@@ -253,11 +259,11 @@ fn forget_exports(out: &Path) -> Vec<String> {
     told
 }
 
-/// Whether the files of a result are what they were when they were written; all of them are read.
+/// Compares all files of a result with its manifest; every file is read.
 ///
 /// # Errors
-/// There is no list.
-pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
+/// There is no valid manifest.
+pub fn check(out: &Path, engine: &Engine) -> Result<Verification> {
     let (manifest, digest) = Manifest::read_with_digest(out)?;
     let look = |file: &OutputFile| -> Result<Option<String>> {
         let path = match without_links(out, &file.path) {
@@ -266,28 +272,31 @@ pub fn check(out: &Path, engine: &Engine) -> Result<Checked> {
         };
         let Some(algorithm) = Algorithm::of(&file.digest) else {
             return Ok(Some(format!(
-                "{}: its checksum is of no kind that is known",
+                "{}: the list of files has a checksum of an unknown kind for it",
                 path.display()
             )));
         };
         Ok(match output(out, &path, algorithm) {
             Ok(now) if now == *file => None,
             Ok(now) if now.n_bytes != file.n_bytes => Some(format!(
-                "{}: {} bytes long, not {}",
+                "{}: the file has {} bytes, the list of files states {}",
                 path.display(),
                 now.n_bytes,
                 file.n_bytes
             )),
-            Ok(_) => Some(format!("{}: its bytes are not those that were written", path.display())),
+            Ok(_) => Some(format!(
+                "{}: its content differs from what the run has written",
+                path.display()
+            )),
             Err(e) => Some(format!("{e}")),
         })
     };
     let wrong = engine.fan_out("verify", manifest.files.iter().collect(), look)?;
-    Ok(Checked { manifest, digest, wrong: wrong.into_iter().flatten().collect() })
+    Ok(Verification { manifest, digest, wrong: wrong.into_iter().flatten().collect() })
 }
 
-/// The list of `out`, if it is of `key` and every file is what it was, as far as lengths, times and
-/// known digests tell.
+/// The manifest of `out`, if it has this key and every file is unchanged as far as lengths, times
+/// and known digests show.
 pub(super) fn unchanged(
     contents: &FileDigests,
     out: &Path,
@@ -313,7 +322,7 @@ fn output(root: &Path, path: &Path, algorithm: Algorithm) -> Result<OutputFile> 
     Ok(OutputFile { path: name(root, path), n_bytes, digest: algorithm.read(path)? })
 }
 
-/// Path within the folder, with `/` on every system.
+/// Path relative to the folder, with `/` on every system.
 fn name(root: &Path, path: &Path) -> String {
     let parts = path.strip_prefix(root).unwrap_or(path).components();
     let parts: Vec<String> =
@@ -321,7 +330,7 @@ fn name(root: &Path, path: &Path) -> String {
     parts.join("/")
 }
 
-/// Moves a file unless it has moved already.
+/// Moves a file, unless it was moved before.
 fn shift(from: &Path, to: &Path) -> Result<()> {
     if !from.exists() && to.exists() {
         return Ok(());
@@ -344,17 +353,18 @@ fn remove(path: &PathBuf) -> Result<()> {
     }
 }
 
-/// Names of all files that points are written to.
+/// Names of all files that the points of a result can be converted to.
 fn export_names() -> impl Iterator<Item = &'static str> {
     PLY.into_iter().chain([copc_name()])
 }
 
-/// The name of a COPC file without its folder.
+/// Name of the COPC file, without its folder.
 pub(crate) fn copc_name() -> &'static str {
     COPC.rsplit('/').next().unwrap_or(COPC)
 }
 
-/// Names of spatial tiles of this edge, of all files of a result, that some boxes touch.
+/// Names of those spatial tiles (of this edge length, metres) among the files of a result that some
+/// boxes touch.
 pub(crate) fn tiles_of(files: &[OutputFile], edge: f64, touched: &[&Aabb]) -> Vec<String> {
     let corner = |name: &str| {
         let (x, y) = name.strip_prefix("tiles/")?.split_once('.')?.0.split_once('_')?;

@@ -1,10 +1,9 @@
-//! What a run is made from in, names for its pieces out: a piece whose name is there already need
-//! not be made again.
+//! The cache of a run: digests of its inputs, keys of the pieces that are computed from them, and
+//! the list of its outputs. A piece whose key is in the cache is not computed again.
 //!
-//! A key is a digest of all that a piece depends on: contents of files, settings, the program
-//! itself. Places, times and the number of threads are no part of it. A piece is looked at before
-//! it is believed: a store has its catalogue, kept fits their checksum, outputs their length and
-//! time.
+//! A key is a digest of everything that a piece depends on: contents of files, settings and the
+//! program itself, but not paths, times or the number of threads. Each piece is checked before it
+//! is used: a store by its catalogue, fits by their checksum, outputs by length and time.
 
 mod digests;
 mod file_digests;
@@ -20,8 +19,8 @@ pub(crate) use digests::Digests;
 pub(crate) use key::Key;
 #[cfg(fuzzing)]
 pub(crate) use manifest::sealed;
-pub use manifest::{Checked, Manifest, OutputFile, check};
 pub(crate) use manifest::{EXPORT, copc_name, tiles_of};
+pub use manifest::{Manifest, OutputFile, Verification, check};
 pub use output::OutputDir;
 pub(crate) use pieces::{Cache, read, reused_in_words, written};
 pub(crate) use publish::WholeResult;

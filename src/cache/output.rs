@@ -1,5 +1,5 @@
-//! The output folder of a run: where results go, where they lie until all are whole, and where the
-//! store is kept.
+//! The output folder of a run: where results are published, where they are written until all of
+//! them are complete, and where the store is kept.
 
 use super::key::Key;
 use super::manifest::Manifest;
@@ -12,31 +12,30 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Name of the folder of the store that nothing is kept in.
+/// Name of a folder in the store whose content is not kept.
 const SCRATCH: &str = "cell";
 
 impl Job {
-    /// Keeps others out of an output folder for as long as what is returned lives.
+    /// Locks an output folder against all other runs until the returned file is dropped.
     ///
     /// # Errors
-    /// Another run is at work in it.
+    /// Another run uses the folder.
     pub fn hold(out: &Path) -> Result<std::fs::File> {
         hold(out)
     }
 
-    /// Keeps those who would write to an output folder out of it for as long as what is returned
-    /// lives.
+    /// Locks an output folder against runs that write to it until the returned file is dropped.
     ///
     /// # Errors
-    /// A run is at work in it.
+    /// A run that writes uses the folder.
     pub fn hold_shared(out: &Path) -> Result<std::fs::File> {
         hold_shared(out)
     }
 
-    /// Prepares the output folder.
+    /// Checks the paths of the job and prepares the output folder.
     ///
     /// # Errors
-    /// Something to read that is not there or lies where the job writes; a path that is a file, or
+    /// An input that is missing or lies where the job writes; an output path that is a file, or
     /// that the system refuses.
     pub fn output(&self) -> Result<OutputDir> {
         self.check_places()?;
@@ -44,22 +43,22 @@ impl Job {
     }
 }
 
-/// The output folder, which nobody else writes to meanwhile.
+/// The locked output folder of a run.
 #[derive(Debug, Clone)]
 pub struct OutputDir {
     out: PathBuf,
     store: PathBuf,
     next: PathBuf,
-    /// Held while the run lives; the system lets go of it, however the run ends.
+    /// The lock, held during the run; the system releases it however the run ends.
     _lock: Arc<File>,
 }
 
 impl OutputDir {
-    /// Makes the folder, keeps others out of it, and finishes what an earlier run was cut short in:
-    /// results that were whole take their places, others are taken away.
+    /// Creates and locks the folder and completes an interrupted earlier run: files of a complete
+    /// result are moved to their places, others are removed.
     ///
     /// # Errors
-    /// A path that is a file, a folder in which another run is at work, or what the system refuses.
+    /// A path that is a file, a folder that another run uses, or an error of the system.
     fn prepare(out: &Path) -> Result<Self> {
         let at = |e: std::io::Error| Error::from(e).at(out.display());
         if out.exists() && !out.is_dir() {
@@ -86,75 +85,75 @@ impl OutputDir {
         Ok(Self { out: out.to_path_buf(), store, next, _lock: Arc::new(lock) })
     }
 
-    /// Where results are written; at the end they move to [`OutputDir::out`].
+    /// Folder where results are written; at the end they are moved to [`OutputDir::out`].
     #[must_use]
     pub fn next(&self) -> &Path {
         &self.next
     }
 
-    /// Where results end up.
+    /// Folder of the published result.
     #[must_use]
     pub fn out(&self) -> &Path {
         &self.out
     }
 
-    /// Where the tiles of inputs lie, a folder each.
+    /// Folder of the tiles of inputs, one subfolder each.
     #[must_use]
     pub fn tiles(&self) -> PathBuf {
         self.store.join("tiles")
     }
 
-    /// Whether the tiles of this name are there and whole.
+    /// Whether tiles with this key exist and open.
     pub(crate) fn has_tiles(&self, key: &Key) -> bool {
         Store::open(&self.tiles().join(key.name()), 0, 1).is_ok()
     }
 
-    /// Where fits of regions lie.
+    /// Folder of the fits of regions.
     #[must_use]
     pub fn fits(&self) -> PathBuf {
         self.store.join("fits")
     }
 
-    /// Where models of the library lie as they were loaded.
+    /// Folder of the models of the library as they were loaded.
     #[must_use]
     pub fn models(&self) -> PathBuf {
         self.store.join("models")
     }
 
-    /// Takes away tiles, fits and models that the run which has just ended did not use.
+    /// Removes tiles, fits and models that the run that has just ended did not use.
     pub(crate) fn prune(&self, tiles: &[Key], fits: &[&Cache], models: &Cache) {
         self.prune_tiles(tiles, models);
         let names: Vec<String> = fits.iter().map(|kept| kept.name()).collect();
         prune(&self.fits(), &names);
     }
 
-    /// The same without fits.
+    /// Removes tiles and models that the run that has just ended did not use.
     pub(crate) fn prune_tiles(&self, tiles: &[Key], models: &Cache) {
         let names: Vec<String> = tiles.iter().map(|key| key.name().into()).collect();
         prune(&self.tiles(), &names);
         prune(&self.models(), &[models.name()]);
     }
 
-    /// Where a rescan makes the clouds of its new points; taken away by the next run where one is
-    /// cut short.
+    /// Folder where a rescan writes the clouds of its new points; the next run removes it if this
+    /// one is interrupted.
     #[must_use]
     pub fn scratch(&self) -> PathBuf {
         self.store.join(SCRATCH)
     }
 
-    /// Where tiles, and what else may be used again, lie.
+    /// Folder of tiles and other pieces that later runs may use again.
     #[must_use]
     pub fn store(&self) -> &Path {
         &self.store
     }
 }
 
-/// Keeps others out of an output folder.
+/// Locks an output folder exclusively.
 fn hold(out: &Path) -> Result<File> {
     locked(&out.join("store").join("lock"))
 }
 
-/// Keeps those who would write to an output folder out of it, and lets others read.
+/// Locks an output folder for reading.
 fn hold_shared(out: &Path) -> Result<File> {
     let path = out.join("store").join("lock");
     let file = File::open(&path).map_err(|e| Error::from(e).at(path.display()))?;
@@ -162,7 +161,7 @@ fn hold_shared(out: &Path) -> Result<File> {
     granted(file, taken, &path)
 }
 
-/// A file that only one process holds.
+/// Opens the lock file.
 fn locked(path: &Path) -> Result<File> {
     let refused = |e: std::io::Error| Error::from(e).at(path.display());
     let file = File::options().create(true).truncate(false).write(true).open(path);
@@ -171,23 +170,23 @@ fn locked(path: &Path) -> Result<File> {
     granted(file, taken, path)
 }
 
-/// What became of the attempt to lock a file.
+/// The locked file, or the error for a lock that another process has.
 fn granted(file: File, taken: std::result::Result<(), TryLockError>, path: &Path) -> Result<File> {
     match taken {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
-            let what = "another run is at work in this output folder";
+            let what = "another run uses this output folder";
             Err(Error::new(Kind::Io, what)
                 .at(path.display())
                 .hint("wait for it to end, or give another --out"))
         }
-        // Some shares know no locks; there the user must take care.
+        // Some network shares do not support locks; there the user must start one run at a time.
         Err(TryLockError::Error(e)) if e.kind() == std::io::ErrorKind::Unsupported => Ok(file),
         Err(TryLockError::Error(e)) => Err(Error::from(e).at(path.display())),
     }
 }
 
-/// Takes away what killed runs left half-written. Only space is lost where it stays.
+/// Removes incomplete files of killed runs. A file that cannot be removed only costs space.
 fn sweep(store: &Path) {
     let folders = std::fs::read_dir(store).into_iter().flatten().flatten().map(|e| e.path());
     let folders = folders.filter(|path| path.is_dir()).chain([store.to_path_buf()]);
@@ -200,13 +199,13 @@ fn sweep(store: &Path) {
     }
 }
 
-/// Removes what lies in a folder of pieces and is none of `used`.
+/// Removes all entries of a folder of pieces whose names do not begin with one of `used`.
 fn prune(folder: &Path, used: &[String]) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         if !used.iter().any(|u| name.to_str().is_some_and(|n| n.starts_with(u.as_str()))) {
             let path = entry.path();
-            // Only space is lost where it stays.
+            // A file that cannot be removed only costs space.
             let _ = if path.is_dir() {
                 std::fs::remove_dir_all(&path)
             } else {

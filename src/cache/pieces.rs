@@ -1,5 +1,4 @@
-//! Pieces that took long to find in (fits of a region, models of a library), a file of each out,
-//! and back: what an earlier run had found already.
+//! Cached pieces that take long to compute (fits of a region, models of a library), one file each.
 
 use super::key::Key;
 use contract::Result;
@@ -9,7 +8,7 @@ use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Pieces by name, all made from what one key stands for.
+/// Pieces by name, all computed from the contents that one key stands for.
 pub(crate) struct Cache {
     folder: PathBuf,
     key: Key,
@@ -22,7 +21,7 @@ impl Cache {
         Self { folder, key, n_kept: AtomicUsize::new(0), n_asked: AtomicUsize::new(0) }
     }
 
-    /// A piece: the one that is kept, else the one that `find` finds, which is then kept.
+    /// Returns the cached piece with this name; otherwise computes it with `find` and stores it.
     pub(crate) fn get_or_compute<T: Serialize + DeserializeOwned>(
         &self,
         name: &str,
@@ -42,21 +41,21 @@ impl Cache {
         Ok(piece)
     }
 
-    /// Pieces that were kept, of all that were asked for.
+    /// Number of pieces that were taken from the cache, and of all that were requested.
     pub(crate) fn n_kept(&self) -> [usize; 2] {
         [&self.n_kept, &self.n_asked].map(|n| n.load(Ordering::Relaxed))
     }
 
-    /// What the names of its files begin with.
+    /// Prefix of the names of its files.
     pub(crate) fn name(&self) -> String {
         self.key.name().into()
     }
 }
 
-/// Length of the digest before a piece, bytes.
+/// Length of the digest at the start of a file, bytes.
 const DIGEST: usize = 32;
 
-/// The bytes of a piece, their digest before them.
+/// The encoded piece, preceded by its digest; `None` where it cannot be encoded.
 pub(crate) fn written(piece: &impl Serialize) -> Option<Vec<u8>> {
     let body = postcard::to_stdvec(piece).ok()?;
     let mut bytes = blake3::hash(&body).as_bytes().to_vec();
@@ -64,7 +63,7 @@ pub(crate) fn written(piece: &impl Serialize) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// The piece, if every byte is as it was written.
+/// Decodes a piece; `None` where its bytes do not match their digest.
 pub(crate) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
     let (digest, body) = bytes.split_at_checked(DIGEST)?;
     if digest != blake3::hash(body).as_bytes() {
@@ -73,8 +72,8 @@ pub(crate) fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
     postcard::from_bytes(body).ok()
 }
 
-/// What was kept of what was asked for (`[kept, all]`, for each name), in words; nothing of what
-/// was all new.
+/// Messages about pieces that were used again: for each name the numbers `[kept, all]`, where at
+/// least one was kept.
 pub(crate) fn reused_in_words<const N: usize>(
     names: [&str; N],
     n_kept: [[usize; 2]; N],

@@ -1,4 +1,5 @@
-//! A whole result beside its output folder in; the same in its place, listed and remembered, out.
+//! Publishes a complete result: lists its files, moves them to the output folder and records their
+//! digests.
 
 use super::digests::Digests;
 use super::manifest::{Manifest, OutputFile};
@@ -7,25 +8,25 @@ use crate::engine::Engine;
 use crate::job::{Job, Outcome};
 use contract::Result;
 
-/// A result that is whole; its files lie beside the output folder.
+/// A complete result whose files lie beside the output folder.
 pub(crate) struct WholeResult<'a> {
     pub(crate) job: &'a Job,
     pub(crate) output: &'a OutputDir,
     pub(crate) digests: &'a Digests,
     pub(crate) outcome: &'a Outcome,
-    /// Files whose digests are known already.
+    /// Entries of files whose checksums were computed while they were written.
     pub(crate) files: Vec<OutputFile>,
 }
 
 impl WholeResult<'_> {
-    /// Gives it its place, and remembers what was read for it; what was taken away beside it, in
-    /// words.
+    /// Moves the result to the output folder and records the digests of its inputs and outputs.
+    /// Returns messages about files that were removed beside it.
     ///
     /// # Errors
-    /// An input that was never read to its end; what the disk refuses.
+    /// An input without a digest; an error of the file system.
     pub(crate) fn publish(self, engine: &Engine) -> Result<Vec<String>> {
         let Self { job, output, digests, outcome, files } = self;
-        Manifest::write(output.next(), digests.whole(job), outcome, files, engine)?;
+        Manifest::write(output.next(), digests.result_key(job), outcome, files, engine)?;
         let (manifest, told) = Manifest::publish(output.next(), output.out())?;
         digests.remember(&manifest, output.out())?;
         Ok(told)

@@ -1,9 +1,9 @@
-//! A result in; its files out, each compared with what the list of the result says of it before
-//! anything of it is believed.
+//! Access to the files of a result, each compared with the result's manifest before its content is
+//! used.
 //!
-//! Only what is read is compared, and that once. The list itself holds its own digest. Who can
-//! write to the folder can of course make a list anew: this tells damage and edits, not a forgery
-//! of the whole.
+//! Only files that are read are compared, each once. The manifest contains its own digest. Somebody
+//! who can write to the folder can make a new manifest: the check detects damage and edits, not a
+//! forgery of the whole result.
 
 use super::file_digests::Algorithm;
 use super::manifest::{LIST, Manifest, OutputFile, RESULT};
@@ -14,22 +14,22 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-/// A result whose files are compared when they are asked for.
+/// A result whose files are compared when they are requested.
 pub(crate) struct VerifiedFiles {
     out: PathBuf,
     manifest: Manifest,
     digest: String,
-    /// By name: the place in the list.
+    /// Index of each file name in the manifest.
     places: HashMap<String, usize>,
-    /// By place in the list: whether the file was compared and is what was written.
+    /// Whether the file at each index was compared and is unchanged.
     compared: Vec<Mutex<bool>>,
 }
 
 impl VerifiedFiles {
-    /// Reads the list of a result.
+    /// Reads the manifest of a result.
     ///
     /// # Errors
-    /// There is none, or it is not what was written.
+    /// There is no manifest, or it was changed.
     pub(crate) fn open(out: &Path) -> Result<Self> {
         let (manifest, digest) = Manifest::read_with_digest(out)?;
         let names = manifest.files.iter().map(|file| file.path.clone());
@@ -42,33 +42,32 @@ impl VerifiedFiles {
         &self.manifest
     }
 
-    /// Digest of the list: it names every byte of the result.
+    /// Digest of the manifest, which covers every byte of the result.
     pub(crate) fn digest(&self) -> &str {
         &self.digest
     }
 
-    /// Whether the list names such a file.
+    /// Whether the manifest names this file.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.places.contains_key(name)
     }
 
-    /// The path of a file that is there, no link, and as long as the list says; its bytes are not
-    /// compared.
+    /// The path of a file that exists, is no symbolic link and has the length that the manifest
+    /// states; its content is not compared.
     ///
     /// # Errors
-    /// A file that the list does not name, or that is not so.
+    /// A file that the manifest does not name, or that fails one of these checks.
     pub(crate) fn path(&self, name: &str) -> Result<PathBuf> {
         self.listed(name).map(|(path, ..)| path)
     }
 
-    /// The path of a file whose bytes are what was written; they are read where nobody compared
-    /// them yet.
+    /// The path of a file whose content is as written; it is read unless it was compared before.
     ///
     /// # Errors
-    /// A file that the list does not name, or that is not what was written.
+    /// A file that the manifest does not name, or that was changed.
     pub(crate) fn compared(&self, name: &str) -> Result<PathBuf> {
         let (path, file, is_compared) = self.listed(name)?;
-        // Others who want the same file wait here, and find it compared.
+        // Other threads that need the same file wait here, and then find it compared.
         let mut is_compared = is_compared.lock().expect("nobody panics while he holds it");
         if !*is_compared {
             let algorithm = algorithm(&path, file)?;
@@ -80,7 +79,7 @@ impl VerifiedFiles {
         Ok(path)
     }
 
-    /// The bytes of a file, compared after they were read.
+    /// The content of a file, compared after it was read.
     ///
     /// # Errors
     /// As [`VerifiedFiles::compared`].
@@ -92,11 +91,11 @@ impl VerifiedFiles {
         if algorithm.of_bytes(&bytes) == file.digest { Ok(bytes) } else { Err(changed(&path)) }
     }
 
-    /// The path of a tile, and the sum that it is to be compared with while it is read; no sum
-    /// where it was compared here.
+    /// The path of a tile, and the checksum to compare it with while it is read; no checksum where
+    /// it was compared here.
     ///
     /// # Errors
-    /// A file that the list does not name, or that is not what was written.
+    /// A file that the manifest does not name, or that was changed.
     pub(crate) fn stated(&self, name: &str) -> Result<(PathBuf, Option<StatedTile>)> {
         let (path, file, _) = self.listed(name)?;
         let digits = file.digest.strip_prefix(Algorithm::Crc32c.name());
@@ -106,17 +105,17 @@ impl VerifiedFiles {
         }
     }
 
-    /// The result itself.
+    /// The content of `result.json`.
     ///
     /// # Errors
-    /// It is not what was written, or is of another version.
+    /// The file was changed, or was written by another version.
     pub(crate) fn result(&self) -> Result<ResultFile> {
         ResultFile::parse(&self.bytes(RESULT)?, &self.out.join(RESULT))
     }
 
     fn listed(&self, name: &str) -> Result<(PathBuf, &OutputFile, &Mutex<bool>)> {
         let at = self.places.get(name).copied().ok_or_else(|| {
-            Error::bad_input(format!("the list of the result's files has no \"{name}\""))
+            Error::bad_input(format!("the list of the result's files does not name \"{name}\""))
                 .at(self.out.join(LIST).display())
                 .hint("run the same job again")
         })?;
@@ -127,34 +126,38 @@ impl VerifiedFiles {
             Error::of_read("a file of the result cannot be read", &path, e).hint(HINT)
         })?;
         if meta.len() != file.n_bytes || !meta.is_file() {
-            let what = format!("it is {} bytes long, not {}", meta.len(), file.n_bytes);
+            let what = format!(
+                "the file has {} bytes, the list of the result's files states {}",
+                meta.len(),
+                file.n_bytes
+            );
             return Err(Error::bad_input(what).at(path.display()).hint(HINT));
         }
         Ok((path, file, &self.compared[at]))
     }
 }
 
-/// The result of an output folder, compared with its list; or of a file of that kind by itself,
-/// which no list vouches for.
+/// The result of an output folder, compared with its manifest, or a single result file, which no
+/// manifest covers.
 ///
 /// # Errors
-/// There is none, or it is not what was written.
+/// There is no result, or it was changed.
 pub(crate) fn result_of(path: &Path) -> Result<ResultFile> {
     if path.is_dir() { VerifiedFiles::open(path)?.result() } else { ResultFile::read(path) }
 }
 
-/// The way out of a file that is not what was written.
-const HINT: &str = "`stillpoint verify` names all files that are wrong; run the same job again";
+/// Hint for a file that was changed.
+const HINT: &str = "`stillpoint verify` names all files that have changed; run the same job again";
 
 fn algorithm(path: &Path, file: &OutputFile) -> Result<Algorithm> {
     Algorithm::of(&file.digest).ok_or_else(|| {
-        let what = "its checksum in the list is of no kind that is known";
+        let what = "the list of the result's files has a checksum of an unknown kind for this file";
         Error::bad_input(what).at(path.display()).hint(HINT)
     })
 }
 
 fn changed(path: &Path) -> Error {
-    let what = "its bytes are not those that were written";
+    let what = "the content of this file differs from what the run has written";
     Error::bad_input(what).at(path.display()).hint(HINT)
 }
 
@@ -165,7 +168,7 @@ mod tests {
     use crate::engine::Engine;
     use crate::job::Outcome;
 
-    /// A folder with a list of two files.
+    /// A folder with a manifest of two files.
     fn result() -> tempfile::TempDir {
         let dir = tempfile::tempdir().expect("a folder");
         std::fs::create_dir_all(dir.path().join("labels")).expect("is made");
@@ -192,7 +195,7 @@ mod tests {
             assert_eq!(error.kind(), contract::Kind::BadInput);
             assert!(error.to_string().starts_with(&mask.display().to_string()), "{error}");
         }
-        // Its length tells without reading; one that is missing is bad input, too.
+        // A wrong length is found without reading; a missing file is bad input, too.
         assert!(again.path("labels/0.kind.npy").is_ok());
         std::fs::write(&mask, b"label").expect("writes");
         assert!(

@@ -1,9 +1,9 @@
-//! A result and a path of one of its robots in; where on the way the robot comes near to what the
-//! scans saw, to other robots, or to what nobody has seen, out.
+//! Checks a path of a robot of a result: where it comes near to scanned surfaces, to other robots,
+//! or to space that no scan has seen.
 //!
-//! In doubt a path is not free: points of which nobody knows stand in the way as fixed ones do,
-//! space that no beam went through is not free, and what a part touched already where it was found
-//! is told apart, not forgotten.
+//! In doubt a path is not free: uncertain points count as obstacles like fixed ones, and space
+//! without beams is not free. Contacts that exist already in the found posture are reported
+//! separately.
 
 mod report;
 mod subject;
@@ -31,32 +31,31 @@ use trajectory::Trajectory;
 /// Checks a path.
 ///
 /// # Errors
-/// No result, or one without what this needs; a path that is none of the robot's; files that cannot
-/// be read.
+/// There is no result or it lacks files for this, the path does not belong to the robot, or files
+/// cannot be read.
 pub fn check(request: &CheckRequest, means: &Means, engine: &Engine) -> Result<PathReport> {
     let path = Trajectory::read(&request.trajectory, means.settings.ingest.max_text_bytes)?;
     let choose = |result: &ResultFile, state: &PlantState| chosen(request, result, state, &path);
-    at_robot(request, choose, means, engine, |place| place.look(&path, engine))
+    at_robot(request, choose, means, engine, |place| place.check_path(&path, engine))
 }
 
-/// A robot of a result, and all that stands around it: its paths can be looked at one after the
-/// other.
+/// A robot of a result with its surroundings, for checking several paths.
 pub(crate) struct RobotSite<'a> {
     request: &'a CheckRequest,
     robot: &'a CheckedRobot<'a>,
     body: RobotBody<'a>,
     obstacles: Obstacles,
-    /// Ids of all robots, by their numbers.
+    /// Ids of all robots, by index.
     ids: Vec<String>,
     /// Whether parts of the run were left out.
     is_partial: bool,
 }
 
-/// Opens the result, and does something at the robot that is chosen.
+/// Opens the result, selects a robot with `choose` and calls `then` with it and its surroundings.
 ///
 /// # Errors
-/// No result, or one without what this needs; what `choose` and `then` end with; files that cannot
-/// be read.
+/// There is no result or it lacks files for this, files cannot be read, or an error of `choose` or
+/// `then`.
 pub(crate) fn at_robot<T>(
     request: &CheckRequest,
     choose: impl FnOnce(&ResultFile, &PlantState) -> Result<usize>,
@@ -65,17 +64,19 @@ pub(crate) fn at_robot<T>(
     then: impl FnOnce(&RobotSite<'_>) -> Result<T>,
 ) -> Result<T> {
     let out = &request.out;
-    // A result that was copied without its store has nobody at work in it.
+    // No run can use a result that was copied without its store.
     let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
     let files = VerifiedFiles::open(out)?;
     let (result, state) = (files.result()?, PlantState::read(&files)?);
     if result.robots.len() != state.fits.len() {
-        return Err(Error::bad_input("the result and what is kept beside it are not of one run")
-            .at(out.display())
-            .hint("run the same job again"));
+        return Err(Error::bad_input(
+            "result.json and plant.bin of this folder are of different runs",
+        )
+        .at(out.display())
+        .hint("run the same job again"));
     }
     let number = choose(&result, &state)?;
-    let (fits, models) = stood(request, &state, means, engine)?;
+    let (fits, models) = reported_robots(request, &state, means, engine)?;
     let robots: Vec<CheckedRobot<'_>> = (fits.iter())
         .map(|(number, fit)| {
             let (entry, model) = (&result.robots[*number], &models[fit.model]);
@@ -84,8 +85,7 @@ pub(crate) fn at_robot<T>(
         .collect();
     robots.iter().try_for_each(|robot| robot.is_of_the_library(files.manifest()))?;
     let robot = robots.iter().find(|robot| robot.number == number);
-    let robot =
-        robot.ok_or_else(|| Error::new(Kind::Bug, "the robot that is meant does not stand"))?;
+    let robot = robot.ok_or_else(|| Error::new(Kind::Bug, "the selected robot has no fit"))?;
     let around = Surroundings { out, files: &files, state: &state, result: &result };
     let others: Vec<(usize, &Fit)> =
         fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
@@ -102,11 +102,11 @@ pub(crate) fn at_robot<T>(
 }
 
 impl RobotSite<'_> {
-    /// Looks along a path.
+    /// Checks one path of the robot.
     ///
     /// # Errors
-    /// A path that is none of the robot's; cancelled.
-    pub(crate) fn look(&self, path: &Trajectory, engine: &Engine) -> Result<PathReport> {
+    /// A path that does not belong to the robot, or a cancelled run.
+    pub(crate) fn check_path(&self, path: &Trajectory, engine: &Engine) -> Result<PathReport> {
         let &Self { request, robot, ref body, ref obstacles, .. } = self;
         let postures = robot.postures(path, request.degrees)?;
         let pairs: Vec<&[Vec<f64>]> = postures.windows(2).collect();
@@ -131,7 +131,7 @@ impl RobotSite<'_> {
     }
 }
 
-/// The robot with what hangs on it, and all that they can get near to.
+/// The robot with attached bodies, and everything within its reach.
 fn surrounded<'a>(
     robot: &CheckedRobot<'a>,
     around: &Surroundings<'_>,
@@ -145,7 +145,8 @@ fn surrounded<'a>(
     loop {
         if far > FARTHEST {
             let what = format!("{} reaches {far:.0} m: that is too far to look", robot.entry.id);
-            return Err(Error::new(Kind::Unsupported, what).hint("mend the limits of its slides"));
+            return Err(Error::new(Kind::Unsupported, what)
+                .hint("correct the limits of its sliding joints in the URDF"));
         }
         let (hung, obstacles) = around.gather(robot, others, models, far, engine)?;
         let largest = obstacles.largest();
@@ -159,17 +160,17 @@ fn surrounded<'a>(
     }
 }
 
-/// What parts may move between two postures, metres, and rounding.
+/// Greatest motion of any part between two checked postures, and a tolerance for rounding, metres.
 const BETWEEN: f64 = 0.02;
 
-/// What hangs on a robot mostly reaches no farther beyond it, metres; where it does, all is looked
-/// at once more.
+/// Usual reach of attached bodies beyond the robot, metres; if one exceeds it, the surroundings are
+/// gathered again.
 const HUNG: f64 = 0.5;
 
-/// Pieces of a path that wait to be summed up.
+/// Number of path segments that are checked before their contacts are merged.
 const WAITING: usize = 1 << 12;
 
-/// Looks along the path.
+/// Contacts along the path.
 fn contacts(walk: &PathWalk<'_>, engine: &Engine) -> Result<Contacts> {
     let mut all = Contacts::default();
     for from in (0..walk.n_pieces()).step_by(WAITING) {
@@ -180,7 +181,7 @@ fn contacts(walk: &PathWalk<'_>, engine: &Engine) -> Result<Contacts> {
     Ok(all)
 }
 
-/// The number of the robot that is meant, of those that stand.
+/// Index of the selected robot among those that are reported.
 fn chosen(
     request: &CheckRequest,
     result: &ResultFile,
@@ -223,16 +224,16 @@ fn chosen(
     }
 }
 
-/// A fit and its number in the result.
-type Numbered = (usize, Fit);
+/// A fit and its index in the result.
+type NumberedFit = (usize, Fit);
 
-/// All robots that stand, by number, and their models.
-fn stood(
+/// All reported robots with their indices, and their models.
+fn reported_robots(
     request: &CheckRequest,
     state: &PlantState,
     means: &Means,
     engine: &Engine,
-) -> Result<(Vec<Numbered>, Vec<Model>)> {
+) -> Result<(Vec<NumberedFit>, Vec<Model>)> {
     let dir = request.robots.as_deref().unwrap_or(&state.robots);
     let stands = |fit: &Fit| fit.verdict != Verdict::Refused;
     let (numbers, fits): (Vec<usize>, Vec<Fit>) =

@@ -1,91 +1,91 @@
-//! What a check is asked for, and what a path came to.
+//! The request of a path check and its report.
 
 use clearance::Contact;
 use geometry::{Point, Pose};
 use std::path::PathBuf;
 
-/// What is to be checked.
+/// Request of a path check.
 #[derive(Debug, Clone)]
 pub struct CheckRequest {
-    /// Output folder of a run.
+    /// Output folder of the run whose result is used.
     pub out: PathBuf,
     /// File of the path.
     pub trajectory: PathBuf,
-    /// Id of the robot; the only one that has all joints of the path where left out.
+    /// Id of the robot; `None` for the only robot that has all joints of the path.
     pub robot: Option<String>,
-    /// Library, where it is not where it was.
+    /// Folder of the robot library, if it has moved since the run.
     pub robots: Option<PathBuf>,
-    /// What is nearer is near, metres.
+    /// Distance below which an obstacle is near, metres.
     pub margin: f64,
-    /// Turning joints of the path are given in degrees.
+    /// Whether turning joints of the path are given in degrees.
     pub degrees: bool,
 }
 
-/// What a path came to.
+/// Outcome of a path check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PathOutcome {
-    /// Nothing is near, and all is known.
+    /// Nothing is near, and the whole space is known.
     Free,
-    /// Nothing is near that was not as near where the robot was found; but not all is known.
+    /// Nothing is nearer than in the found posture, but not everything is known.
     Unknown,
     /// Something is nearer than the margin.
     Near,
-    /// Something is hit, or a joint cannot get there.
+    /// Something is hit, or a joint cannot follow the path.
     Blocked,
 }
 
 /// Why a path is not known to be free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum PathDoubt {
-    /// It leads through space that no beam went through
+    /// The path leads through space that no beam passed through
     Unseen,
-    /// It comes nearer to uncertain points within 10 cm of where the robot was found: most are its
-    /// own and move with it, some may stand in its way
+    /// The path comes nearer to uncertain points within 10 cm of where the robot was found: most
+    /// belong to the robot and move with it, some may be obstacles
     Beside,
-    /// Parts are as near to something as they were where the robot was found
+    /// Parts are as near to an obstacle as where the robot was found
     AsFound,
-    /// The robot's posture is doubtful, not known well enough for the margin, or a joint is not
-    /// determined that the path leaves as found
+    /// The robot's posture is doubtful, not known well enough for the margin, or a joint that the
+    /// path leaves as found is undetermined
     Posture,
 }
 
-/// What was found.
+/// Report of a path check.
 pub struct PathReport {
     /// Id of the robot.
     pub robot: String,
     /// Names of its links.
     pub links: Vec<String>,
-    /// World from its base.
+    /// Pose of its base in the world frame.
     pub world_from_base: Pose,
-    /// How near it comes to what.
+    /// Contacts with obstacles.
     pub contacts: Vec<Contact>,
-    /// What joints cannot do, in words, with the waypoint.
+    /// Waypoints that the joints cannot reach, with messages.
     pub impossible: Vec<(f64, String)>,
-    /// Why it is not known to be free.
+    /// Reasons why the path is not known to be free.
     pub doubts: Vec<PathDoubt>,
-    /// What a person should know, in words.
+    /// Warnings for people.
     pub warnings: Vec<String>,
-    /// The worst of all.
+    /// The worst outcome along the path.
     pub outcome: PathOutcome,
-    /// Waypoints, and postures that were looked at.
+    /// Number of waypoints.
     pub n_waypoints: usize,
-    /// See `n_waypoints`.
+    /// Number of postures that were checked.
     pub n_postures: usize,
-    /// When waypoints are reached, seconds, where the path says.
+    /// Times of the waypoints, seconds; empty where the path states none.
     pub times: Vec<f64>,
-    /// What was asked for, metres.
+    /// The requested margin, metres.
     pub margin: f64,
-    /// Ids of all robots, by their numbers.
+    /// Ids of all robots, by index.
     pub ids: Vec<String>,
 }
 
 impl PathReport {
-    /// A point of the base's frame in the world.
+    /// World coordinates of a point in the base frame, metres.
     pub(super) fn world(&self, p: &Point) -> [f64; 3] {
         (self.world_from_base * p).coords.into()
     }
 
-    /// Whether the path may be gone where these doubts are allowed.
+    /// Whether the path may be executed if these doubts are allowed.
     #[must_use]
     pub fn passes(&self, allowed: &[PathDoubt]) -> bool {
         self.outcome <= PathOutcome::Unknown

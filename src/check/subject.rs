@@ -1,5 +1,5 @@
-//! A robot of a result and a path in; the path as whole postures, what the joints cannot do, and
-//! what the path came to, out.
+//! The checked robot: a path as whole postures, limits of its joints, uncertainty of its posture,
+//! and the outcome of a path.
 
 use super::report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
 use super::trajectory::Trajectory;
@@ -9,12 +9,12 @@ use contract::{Error, Fit, JointFit, Result, Verdict};
 use export::{RobotEntry, mesh_files};
 use robot::{JointKind, Model};
 
-/// Opening of a closed loop that is none, metres: less than a scanner sees.
+/// Greatest gap of a closed loop that counts as closed, metres: less than a scanner resolves.
 const LOOP_GAP: f64 = 1e-4;
-/// A value so far beyond its limit is rounding, radians or metres.
+/// Distance beyond a limit that counts as rounding, radians or metres.
 const ROUNDING: f64 = 1e-6;
 
-/// A robot of a result.
+/// The robot of a result that is checked.
 pub(super) struct CheckedRobot<'a> {
     pub(super) entry: &'a RobotEntry,
     pub(super) number: usize,
@@ -23,7 +23,7 @@ pub(super) struct CheckedRobot<'a> {
 }
 
 impl CheckedRobot<'_> {
-    /// Refuses a model that is no longer the one that was found: by links, joints and triangles.
+    /// Refuses a model that differs from that of the run in links, joints or triangles.
     pub(super) fn is_of_the_library(&self, manifest: &Manifest) -> Result<()> {
         let model = self.model;
         let bad = |what: &str| {
@@ -53,13 +53,12 @@ impl CheckedRobot<'_> {
         Ok(())
     }
 
-    /// The posture that it was scanned in.
+    /// The posture in which it was found.
     pub(super) fn found(&self) -> Vec<f64> {
         self.fit.joints.iter().map(|j| j.value).collect()
     }
 
-    /// The waypoints as whole postures: joints that the path does not name stay where they were
-    /// found.
+    /// The waypoints as whole postures: joints that the path does not name keep their found values.
     pub(super) fn postures(&self, path: &Trajectory, degrees: bool) -> Result<Vec<Vec<f64>>> {
         let columns: Vec<Option<usize>> = (self.fit.joints.iter())
             .map(|joint| path.joints.iter().position(|name| *name == joint.name))
@@ -81,8 +80,8 @@ impl CheckedRobot<'_> {
         Ok(path.points.iter().map(posture).collect())
     }
 
-    /// What its joints cannot do, and where on the path; closed loops stay open as the
-    /// contacts say.
+    /// Waypoints that its joints cannot reach, with messages; `contacts` states which closed loops
+    /// stay open.
     pub(super) fn impossible(
         &self,
         path: &[Vec<f64>],
@@ -113,7 +112,7 @@ impl CheckedRobot<'_> {
         out
     }
 
-    /// Why its posture is not certain enough, in words.
+    /// Reasons why its posture is not certain enough for the margin.
     fn uncertain(&self, path: &Trajectory, margin: f64) -> Vec<String> {
         let (fit, id) = (self.fit, &self.entry.id);
         let mut out = Vec::new();
@@ -131,12 +130,12 @@ impl CheckedRobot<'_> {
             let (name, word) = (&joint.name, joint.certainty.word());
             format!("joint '{name}' is {word}, and the path does not give it")
         }));
-        // How far the base's turn takes what it reaches.
+        // The uncertainty of the base's rotation moves the farthest point of the robot by this.
         let [shift, turn] =
             [0, 3].map(|i| fit.base_sigma[i..i + 3].iter().map(|s| s * s).sum::<f64>());
         let lever = clearance::reach(self.model);
         let sigma = (shift + turn * lever.powi(2) + fit.tip_sigma.powi(2)).sqrt();
-        // Also where it is no number.
+        // An undefined deviation counts as uncertain, too.
         if sigma.is_nan() || 3.0 * sigma > margin {
             out.push(format!(
                 "what {id} reaches is known to ± {:.1} mm: a margin of {:.1} mm is less than three times that",
@@ -147,7 +146,7 @@ impl CheckedRobot<'_> {
         out
     }
 
-    /// What the path came to.
+    /// The report of the path.
     pub(super) fn report(
         &self,
         request: &CheckRequest,
@@ -161,7 +160,7 @@ impl CheckedRobot<'_> {
         let stands = |c: &&Contact| !c.as_found && !is_beside(c);
         let is = |level: ContactLevel| contacts.iter().filter(stands).any(|c| c.level >= level);
         let has = |is: &dyn Fn(&Contact) -> bool| contacts.iter().any(is);
-        // What was as near where it stood is no news: it stood there.
+        // An obstacle that was as near in the found posture does not make the path worse.
         if has(&Contact::is_unseen) {
             doubts.push(PathDoubt::Unseen);
         }

@@ -1,4 +1,4 @@
-//! A result and one of its robots in; what hangs on that robot, and all that stands around it, out.
+//! Surroundings of a robot: bodies attached to it, and all obstacles within its reach.
 
 use super::CheckedRobot;
 use crate::cache::{VerifiedFiles, tiles_of};
@@ -16,13 +16,13 @@ use robot::Model;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Points of a tile that are looked at before each cell is kept once.
+/// Number of points of a tile after which repeated cells are merged.
 const SETTLED: usize = 1 << 22;
 
-/// Scanners that are farther off tell few points about a robot, metres.
+/// Distance beyond which scanners contribute few points about a robot, metres.
 const SCANNED_FROM: f64 = 30.0;
 
-/// A result.
+/// A result, from whose tiles and spaces surroundings are gathered.
 pub(super) struct Surroundings<'a> {
     pub(super) out: &'a Path,
     pub(super) files: &'a VerifiedFiles,
@@ -30,33 +30,34 @@ pub(super) struct Surroundings<'a> {
     pub(super) result: &'a ResultFile,
 }
 
-/// What is taken of the points near a robot.
+/// Rules by which points near a robot are sorted to obstacles and attached bodies.
 struct Sorting<'a> {
     number: i16,
     base_from_world: Pose,
-    /// Farthest from the base on each of its axes, metres.
+    /// Greatest distance from the base along each of its axes, metres.
     far: f64,
-    /// Links from the base, as the robot was found.
+    /// Pose of the base in each link's frame, in the found posture.
     link_from_base: Vec<Pose>,
-    /// By link: whether joints move it.
+    /// For each link, whether joints move it.
     moves: &'a [bool],
-    /// By LAS `point_source_id`: what robots hide from the scanners that its points may be of.
+    /// By LAS `point_source_id`: shadows of robots as seen from the scanners that may have measured
+    /// its points.
     shadows: BTreeMap<u16, Vec<&'a Shadow>>,
-    /// By LAS `point_source_id`, where it is that of one scanner: that scanner.
+    /// By LAS `point_source_id`, where it belongs to one scanner: that scanner.
     eyes: BTreeMap<u16, ScannerAt>,
 }
 
-/// Points of a tile.
-struct Sorted {
+/// Sorted points of a tile.
+struct SortedPoints {
     cells: Cells,
     n_waiting: usize,
-    /// Cells of points that hang on each link, and whether all beams to them grazed an edge.
+    /// Cells of points attached to each link, and whether all beams to them grazed an edge.
     hung: BTreeMap<usize, BTreeMap<[i32; 3], bool>>,
 }
 
 impl Surroundings<'_> {
-    /// What hangs on a robot, and what stands around it no farther than so on each axis of its
-    /// base, metres: points, `others`, and space that no beam went through.
+    /// Gathers bodies attached to the robot, and obstacles up to a distance along each axis of its
+    /// base, metres: points, `others`, and space without beams.
     pub(super) fn gather(
         &self,
         robot: &CheckedRobot<'_>,
@@ -68,7 +69,7 @@ impl Surroundings<'_> {
         let moves = robot.model.moving();
         let base_from_world = &robot.fit.world_from_base.inverse();
         let standing = |(number, fit): &(usize, &Fit)| {
-            // However it stood, it may stand so again.
+            // The robot may return to each posture in which it was scanned.
             let all = std::iter::once(*fit).chain(&fit.stays);
             let placed = |fit: &Fit| {
                 let model = &models[fit.model];
@@ -80,7 +81,7 @@ impl Surroundings<'_> {
         let others: Vec<_> = others.iter().flat_map(standing).collect();
         let shadows = self.shadows(robot, &others, engine)?;
         let mut sorting = sorting(robot, far, &moves);
-        sorting.shadows = self.told_by(&shadows);
+        sorting.shadows = self.shadows_by_source(&shadows);
         sorting.eyes = self.eyes(base_from_world);
         let (cells, hung) = self.points(&sorting, engine)?;
         let read = |entry: &SpaceEntry| {
@@ -93,7 +94,7 @@ impl Surroundings<'_> {
         Ok((hung, Obstacles::new(&cells, &others, space.as_ref(), known)))
     }
 
-    /// Cells of all points that may stand in the way, and points that hang on the robot.
+    /// Cells of all points that may be obstacles, and points attached to the robot.
     fn points(&self, sorting: &Sorting<'_>, engine: &Engine) -> Result<(Cells, AttachedPoints)> {
         let Some(edge) = self.state.records.tile_edge() else {
             return Err(Error::bad_input("the result has no tiles to read its points from")
@@ -106,7 +107,7 @@ impl Surroundings<'_> {
         let names = tiles_of(&self.files.manifest().files, edge, &[&world]);
         let las = self.state.records.las();
         let tiles = engine.fan_out(Task::new("points"), names, |name| {
-            let mut own = Sorted::new(sorting);
+            let mut own = SortedPoints::new(sorting);
             let (path, stated) = self.files.stated(&name)?;
             read_tile(&path, &las, stated, |points| {
                 points.iter().try_for_each(|p| self.sort(sorting, p, &mut own))?;
@@ -116,7 +117,7 @@ impl Surroundings<'_> {
             own.settle(0);
             Ok(own)
         })?;
-        let mut all = Sorted::new(sorting);
+        let mut all = SortedPoints::new(sorting);
         for own in tiles {
             all.cells.join(own.cells);
             for (link, cells) in own.hung {
@@ -133,7 +134,7 @@ impl Surroundings<'_> {
         Ok((all.cells, hung.collect()))
     }
 
-    /// What the robots that stand hide from each scanner that is known; frame of the base.
+    /// Shadows of the robots from each known scanner, frame of the base.
     fn shadows(
         &self,
         robot: &CheckedRobot<'_>,
@@ -156,9 +157,12 @@ impl Surroundings<'_> {
         })
     }
 
-    /// The shadows by the `point_source_id` of the points that they may be of: those of files that
-    /// had such ids keep them, others have the number of their scan, from 1.
-    fn told_by<'s>(&self, shadows: &'s [(usize, Shadow)]) -> BTreeMap<u16, Vec<&'s Shadow>> {
+    /// Shadows by the `point_source_id` of points that may lie in them: files with such ids keep
+    /// them, others use the number of the scan, from 1.
+    fn shadows_by_source<'s>(
+        &self,
+        shadows: &'s [(usize, Shadow)],
+    ) -> BTreeMap<u16, Vec<&'s Shadow>> {
         let mut out: BTreeMap<u16, Vec<&Shadow>> = BTreeMap::new();
         for (at, shadow) in shadows {
             if let Some(id) = self.source_id(*at) {
@@ -172,7 +176,7 @@ impl Surroundings<'_> {
         self.state.scans[scan].source_id.or(u16::try_from(scan + 1).ok())
     }
 
-    /// The scanners that are known, where points tell of which they are.
+    /// Known scanners whose points can be identified, by `point_source_id`.
     fn eyes(&self, base_from_world: &Pose) -> BTreeMap<u16, ScannerAt> {
         let mut all: BTreeMap<u16, Vec<&Scan>> = BTreeMap::new();
         for (at, scan) in self.state.scans.iter().enumerate() {
@@ -187,11 +191,11 @@ impl Surroundings<'_> {
         all.into_iter().filter_map(eye).collect()
     }
 
-    fn sort(&self, sorting: &Sorting<'_>, point: &OldPoint, into: &mut Sorted) -> Result<()> {
+    fn sort(&self, sorting: &Sorting<'_>, point: &OldPoint, into: &mut SortedPoints) -> Result<()> {
         let p = sorting.base_from_world * Point::from(point.world);
         let label = point.label;
         let is_own = label.robot == sorting.number;
-        // What hangs on the robot counts wherever it is.
+        // Attached points count wherever they are.
         let is_hung = is_own && label.kind == PointKind::Attachment;
         let is_inside = sorting.bounds().contains(p.coords.into());
         if !is_inside && !is_hung {
@@ -211,7 +215,7 @@ impl Surroundings<'_> {
                         meet(into.hung.entry(link).or_default(), cell, is_grazed);
                         return Ok(());
                     }
-                    // What hangs on its foot stays where it is.
+                    // Points attached to its foot do not move.
                     None if is_inside => ObstacleKind::Uncertain,
                     None => return Ok(()),
                 }
@@ -228,17 +232,17 @@ impl Surroundings<'_> {
         Ok(())
     }
 
-    /// Another robot of the result.
+    /// The obstacle that is another robot of the result.
     fn named(&self, number: i16, point: &OldPoint) -> Result<ObstacleKind> {
         if (number as usize) < self.result.robots.len() {
             return Ok(ObstacleKind::Robot(number));
         }
         let [x, y, z] = point.world;
         Err(Error::bad_input(format!(
-            "a point at ({x:.3}, {y:.3}, {z:.3}) is of robot {number}, which the result has not"
+            "a point at ({x:.3}, {y:.3}, {z:.3}) belongs to robot {number}, which is not in the result"
         ))
         .at(self.out.join("tiles").display())
-        .hint("`stillpoint verify` checks whether the result is complete"))
+        .hint("`stillpoint verify` tells whether the result is complete"))
     }
 }
 
@@ -256,19 +260,19 @@ fn sorting<'m>(robot: &CheckedRobot<'_>, far: f64, moves: &'m [bool]) -> Sorting
     }
 }
 
-/// Adds a point to the cells that hang on a link.
+/// Adds a point to the cells attached to a link.
 fn meet(cells: &mut BTreeMap<[i32; 3], bool>, cell: [i32; 3], is_grazed: bool) {
     *cells.entry(cell).or_insert(is_grazed) &= is_grazed;
 }
 
 impl Sorting<'_> {
-    /// Frame of the base.
+    /// Bounds of the surroundings, frame of the base, metres.
     fn bounds(&self) -> Aabb {
         Aabb { min: [-self.far; 3], max: [self.far; 3] }
     }
 }
 
-impl Sorted {
+impl SortedPoints {
     fn new(sorting: &Sorting<'_>) -> Self {
         let cells = Cells::within(sorting.far, &sorting.eyes);
         Self { cells, n_waiting: 0, hung: BTreeMap::new() }

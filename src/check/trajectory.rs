@@ -1,4 +1,4 @@
-//! A robot's path as a file in; names of joints, and their values at each waypoint, out.
+//! Reads a robot's path from a file: names of joints, and their values at each waypoint.
 //!
 //! ```text
 //! CSV     a head of joints' names, perhaps with a column `time`; a line for each waypoint; radians and metres
@@ -11,11 +11,11 @@ use contract::{Error, Kind, Result};
 use serde_json::Value;
 use std::path::Path;
 
-/// Files with more waypoints are no path of one robot.
+/// Most waypoints of a path.
 const MAX_WAYPOINTS: usize = 1_000_000;
-/// No joint gets so far, radians, degrees or metres.
+/// Greatest joint value, radians, degrees or metres.
 const MAX_VALUE: f64 = 1e5;
-/// Names of columns that are times, not joints.
+/// Names of columns that hold times instead of joint values.
 const TIMES: [&str; 2] = ["time", "time_from_start"];
 
 /// A path of one robot.
@@ -23,9 +23,10 @@ const TIMES: [&str; 2] = ["time", "time_from_start"];
 pub struct Trajectory {
     /// Names of joints, each once.
     pub joints: Vec<String>,
-    /// Their values at each waypoint, in that order, in the file's units; at least one.
+    /// Joint values at each waypoint, in that order and in the units of the file; at least one
+    /// waypoint.
     pub points: Vec<Vec<f64>>,
-    /// When each waypoint is reached, seconds; empty where the file does not say.
+    /// Time of each waypoint, seconds; empty where the file states none.
     pub times: Vec<f64>,
 }
 
@@ -33,8 +34,8 @@ impl Trajectory {
     /// Reads a path.
     ///
     /// # Errors
-    /// A file that cannot be read or has more than `most` bytes, or is no path: with the line or
-    /// the waypoint.
+    /// A file that cannot be read, has more than `most` bytes, or is not a path; named with the
+    /// line or the waypoint.
     pub fn read(path: &Path, most: u64) -> Result<Self> {
         let bad = |what: String| {
             let hint = "a path is CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory, both in UTF-8";
@@ -105,7 +106,7 @@ fn csv(text: &str) -> std::result::Result<Trajectory, String> {
             ));
         }
         let number = |c: usize| -> std::result::Result<f64, String> {
-            // Where columns are parted by semicolons, a comma is a decimal point.
+            // Where columns are separated by semicolons, a comma is the decimal separator.
             let cell =
                 if separator == Some(';') { cells[c].replace(',', ".") } else { cells[c].clone() };
             let value = cell.parse::<f64>().ok().filter(|v| v.is_finite());

@@ -1,18 +1,18 @@
-//! What a path came to in; that for people and for programs out.
+//! The report of a path check as text for people and as JSON for programs.
 
 use super::report::{PathDoubt, PathOutcome, PathReport};
 use clearance::{Contact, ContactLevel, ObstacleKind, STEP};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
-/// Name and version of what is told to programs.
+/// Name and version of the JSON format.
 const SCHEMA: &str = "stillpoint.check/2";
-/// What is never looked at.
+/// What a check does not cover.
 const NOT_CHECKED: &str = "the robot against itself, other robots in motion, the way to the first waypoint, joints that do not go \
      straight from one waypoint to the next, limits of joints that follow others, sides that nobody saw of what hangs on it";
 
 impl PathOutcome {
-    /// As it is written.
+    /// The outcome as a word.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -79,14 +79,14 @@ impl PathReport {
         }
     }
 
-    /// When a place of the path is reached, seconds.
+    /// Time at a position of the path, seconds.
     fn time(&self, place: f64) -> Option<f64> {
         let from = self.times.get(place.floor() as usize)?;
         let to = self.times.get(place.ceil() as usize)?;
         Some(from + place.fract() * (to - from))
     }
 
-    /// Why the outcome is what it is, in one sentence.
+    /// The reason for the outcome, as one sentence.
     #[must_use]
     pub fn why(&self) -> String {
         let margin = self.margin * 1e3;
@@ -140,7 +140,7 @@ impl PathReport {
         }
     }
 
-    /// For people.
+    /// The report as text for people.
     #[must_use]
     pub fn words(&self) -> String {
         let mut text = format!(
@@ -189,7 +189,7 @@ impl PathReport {
         text
     }
 
-    /// For programs.
+    /// The report as JSON for programs.
     #[must_use]
     pub fn json(&self) -> Value {
         let contact = |c: &Contact| {

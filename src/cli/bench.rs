@@ -1,4 +1,4 @@
-//! `bench`: suites and numbers in; tables of what the program is worth out.
+//! The commands `bench ...`: each runs a bench and prints its table.
 
 use super::bench_flags::{
     AccuracyFlags, Against, CheckBenchFlags, KeptFlags, PlanBenchFlags, PlantFlags,
@@ -66,7 +66,7 @@ pub(super) fn bench_plan(flags: &PlanBenchFlags, common: &Common, say: &Say) -> 
 
 pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
-    // Of a case that fails the bench says so and goes on; a library that is not there fails all.
+    // A failed case is reported and the bench goes on, but without a library all cases would fail.
     if let Some(robots) = &flags.kept.robots {
         robot::Library::open(robots)?;
     }
@@ -114,7 +114,7 @@ pub(super) fn bench_throughput(flags: &ThroughputFlags, common: &Common, say: &S
         };
         let size = number[..split].parse().ok().zip(factor).map(|(n, f): (f64, f64)| n * f);
         size.filter(|n| (1e4..=1e12).contains(n)).map(|n| n as u64).ok_or_else(|| {
-            Error::new(Kind::Usage, format!("this is no number of points: \"{text}\""))
+            Error::new(Kind::Usage, format!("this is not a number of points: \"{text}\""))
                 .hint("write for example 100M")
         })
     };
@@ -134,7 +134,7 @@ pub(super) fn bench_throughput(flags: &ThroughputFlags, common: &Common, say: &S
     Ok(exit::OK)
 }
 
-/// The cases that flags ask for.
+/// The random cases of these flags.
 fn drawn(seeds: &SeedFlags, kept: &KeptFlags) -> DrawnCases {
     let KeptFlags { robots, out, keep } = kept.clone();
     DrawnCases { first: seeds.first, seed: seeds.seed, robots, out, keep }

@@ -1,5 +1,4 @@
-//! `demo`: nothing in; a virtual cell, what was found in it, and how that compares with the truth,
-//! out.
+//! The command `demo`: prints what was found in a virtual cell and how it compares with the truth.
 
 use super::exit;
 use super::flags::{Common, DemoFlags};

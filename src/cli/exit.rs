@@ -1,16 +1,16 @@
-//! Errors in, exit codes out: what scripts rely on.
+//! Exit codes of the program, on which scripts rely.
 
 use contract::Kind;
 use std::process::ExitCode;
 
-/// All is well.
+/// Success.
 pub const OK: u8 = 0;
-/// Done, and the answer is no: a path is not free.
+/// The answer of a check is no: a path is not free.
 pub const NO: u8 = 1;
-/// Done in part: something was skipped or refused, as the result says.
+/// Success in part: something was skipped or refused, as the result states.
 pub const PARTIAL: u8 = 3;
 
-/// The code that a program ends with after an error of this kind.
+/// The exit code for an error of this kind.
 #[must_use]
 pub fn code(kind: Kind) -> u8 {
     match kind {
@@ -18,12 +18,12 @@ pub fn code(kind: Kind) -> u8 {
         Kind::BadInput | Kind::Unsupported => 4,
         Kind::OverBudget => 5,
         Kind::Cancelled => 130,
-        // Io, Bug, and kinds that `contract` may gain.
+        // `Io`, `Bug`, and kinds that `contract` may add.
         _ => 1,
     }
 }
 
-/// The same for `main`.
+/// The exit code as `main` returns it.
 #[must_use]
 pub fn exit(code: u8) -> ExitCode {
     ExitCode::from(code)

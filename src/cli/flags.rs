@@ -1,19 +1,19 @@
-//! Commands and flags, as `clap` knows them. Their names are fixed: people and scripts rely on
-//! them.
+//! Commands and flags, as `clap` parses them. Their names are stable, since people and scripts rely
+//! on them.
 
 use super::bench_flags::BenchCommand;
 use super::say::LogFormat;
 use crate::check::PathDoubt;
 use crate::engine::Engine;
 use crate::engine::progress::{Mode, Progress};
-use crate::job::{Given, Means};
+use crate::job::{FlagValues, Means};
 use crate::result::conversion::Format;
 use clap::{Args, Parser, Subcommand};
 use contract::Result;
 use std::path::PathBuf;
 
-/// Finds the robots in laser scans of a plant, in which posture they stand, and splits the cloud
-/// into what moves and what stands still.
+/// Finds robots in laser scans of a plant, recovers their postures, and divides the points into
+/// moving and fixed ones.
 #[derive(Debug, Parser)]
 #[command(name = "stillpoint", version, subcommand_required = true, arg_required_else_help = true)]
 pub(super) struct Line {
@@ -25,36 +25,37 @@ pub(super) struct Line {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// A virtual robot cell: build, scan, run, compare with truth, report
+    /// Build a virtual robot cell, scan it, run on the scans and compare the result with the truth
     Demo(DemoFlags),
-    /// What is in these scans, and what will be worse for what they lack
+    /// Show what scans contain, and which missing data make results worse
     Inspect(InspectFlags),
-    /// The main job: scans and a robot library in, postures and masks out
+    /// Find the robots in scans, recover their postures and label all points (the main command)
     Run(RunFlags),
-    /// As run, but only says what it would take: memory, disk, time
+    /// Estimate memory, disk space and time of a run without running it
     Plan(PlanFlags),
-    /// One cell again: an earlier result and new scans in, the whole result with that cell brought
-    /// up to date out
+    /// Bring one cell of an earlier result up to date with new scans; writes the whole result and a
+    /// list of changes
     Rescan(RescanFlags),
-    /// Whether the files of a result are what they were when they were written
+    /// Verify that the files of a result are unchanged since they were written
     Verify(OutFlags),
-    /// What a run came to, once more; robots as cases for a build server with --junit
+    /// Show the summary of a result again; --junit writes its robots as test cases for a build
+    /// server
     Report(ReportFlags),
-    /// A result's points in another format: COPC or PLY
+    /// Convert the points of a result to another format: COPC or PLY
     Export(ExportFlags),
-    /// Whether a path of one robot keeps clear of what was scanned
+    /// Check whether a path of a robot keeps clear of scanned obstacles
     Check(CheckFlags),
-    /// Which robots differ between two results of one plant: moved, exchanged, appeared, gone
+    /// List the robots that differ between two results of a plant: moved, exchanged, appeared, gone
     Diff(DiffFlags),
-    /// Which results lie in a folder, which goes on from which, and what each takes; --remove takes
-    /// one away
+    /// List the results in a folder, which result each one started from, and its size; --remove
+    /// removes one
     History(HistoryFlags),
-    /// Virtual scanner: a scene file in, scans and their truth out
+    /// Scan a scene file with the virtual scanner; writes scans and their truth
     Simulate(SimulateFlags),
-    /// How exact, how fast
+    /// Measure accuracy and speed
     #[command(subcommand)]
     Bench(BenchCommand),
-    /// About robot libraries
+    /// Check and calibrate robot libraries
     #[command(subcommand)]
     Robots(RobotsCommand),
 }
@@ -63,13 +64,14 @@ pub(super) enum Command {
 pub(super) enum RobotsCommand {
     /// Check a robot library
     Lint(LintFlags),
-    /// Put together what runs with --calibrate found of one robot, and write its model so corrected
+    /// Combine what runs with --calibrate have found for one robot, and write its corrected model
     Calibrate(CalibrateFlags),
 }
 
 #[derive(Debug, Args)]
 pub(super) struct DemoFlags {
-    /// Keep scene, scans, robots and results here (else in a temporary folder that is removed)
+    /// Folder that keeps scene, scans, robots and results (default: a temporary folder that is
+    /// removed)
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
 }
@@ -79,7 +81,7 @@ pub(super) struct InspectFlags {
     /// Scan files: E57, PTX, LAS, LAZ
     #[arg(required = true, value_name = "INPUT")]
     pub(super) inputs: Vec<PathBuf>,
-    /// Answer in JSON
+    /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
 }
@@ -89,20 +91,20 @@ pub(super) struct RunFlags {
     /// Scan files: E57, PTX, LAS, LAZ
     #[arg(required = true, value_name = "INPUT")]
     pub(super) inputs: Vec<PathBuf>,
-    /// Robot library: a folder of folders, each with robot.urdf and its meshes
+    /// Robot library: a folder with one subfolder per model, each with robot.urdf and its meshes
     #[arg(long, value_name = "DIR")]
     pub(super) robots: PathBuf,
-    /// Where results go
+    /// Output folder
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// What a person knows of the robots: places where one stands, of which model, or none (TOML)
+    /// Review file (TOML) with what a person knows: places with a robot, with a certain model, or
+    /// without one
     #[arg(long, value_name = "FILE")]
     pub(super) review: Option<PathBuf>,
-    /// Finish without the files and robots that fail, and exit with 3
+    /// Go on without files and robots that fail, and exit with code 3
     #[arg(long)]
     pub(super) keep_going: bool,
-    /// Estimate where the joints of each robot really are, too: for robots that their models fit
-    /// poorly
+    /// Also estimate the joint axes of each robot, for robots that their models fit poorly
     #[arg(long)]
     pub(super) calibrate: bool,
 }
@@ -111,27 +113,27 @@ pub(super) struct RunFlags {
 pub(super) struct PlanFlags {
     #[command(flatten)]
     pub(super) run: RunFlags,
-    /// Answer in JSON
+    /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct RescanFlags {
-    /// Output folder of the earlier run, or rescan
+    /// Output folder of the earlier run or rescan
     #[arg(long, value_name = "OUT")]
     pub(super) base: PathBuf,
     /// New scans of the cell: E57, PTX, LAS, LAZ
     #[arg(required = true, value_name = "INPUT")]
     pub(super) inputs: Vec<PathBuf>,
-    /// Where results go; what did not change is shared with the earlier run
+    /// Output folder; unchanged files are shared with the earlier result
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// Robot library (else that of the earlier run)
+    /// Robot library (default: that of the earlier run)
     #[arg(long, value_name = "DIR")]
     pub(super) robots: Option<PathBuf>,
-    /// Bounds of the cell, metres: least x, y, z, greatest x, y, z (else what the new scans see
-    /// well)
+    /// Bounds of the cell, metres: least x, y, z, then greatest x, y, z (default: what the new
+    /// scans see well)
     #[arg(
         long,
         value_name = "X,Y,Z,X,Y,Z",
@@ -141,12 +143,12 @@ pub(super) struct RescanFlags {
         conflicts_with = "robot"
     )]
     pub(super) cell: Vec<f64>,
-    /// Where the new scans are: "same", their frame is the plant's; or about where the first new
-    /// scanner stands in the plant, metres, and how far the new frame is turned, degrees (else
-    /// found by surfaces, and refused where that is not clear)
+    /// Frame of the new scans: "same" for the plant's frame, or the approximate position of the
+    /// first new scanner in the plant, metres, and the turn of the new frame, degrees (default:
+    /// found from surfaces, and refused where that is ambiguous)
     #[arg(long, value_name = "X,Y,Z,YAW", allow_hyphen_values = true)]
     pub(super) frame: Option<String>,
-    /// The cell is what these robots of the earlier run reach
+    /// Use the reach of these robots of the earlier run as the cell
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     pub(super) robot: Vec<String>,
 }
@@ -156,8 +158,8 @@ pub(super) struct ExportFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
-    /// Which format; files go to OUT/export; a later run into OUT takes them away where the points
-    /// are others, and says so
+    /// Format; files are written to OUT/export, and a later run into OUT removes them if the points
+    /// have changed, and reports it
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: Format,
 }
@@ -167,26 +169,26 @@ pub(super) struct CheckFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
-    /// The path: CSV with joints' names in its head, or JSON as trajectory_msgs/JointTrajectory;
+    /// Path: CSV with joint names in the first line, or JSON as trajectory_msgs/JointTrajectory;
     /// radians and metres
     #[arg(long, value_name = "FILE")]
     pub(super) trajectory: PathBuf,
-    /// Whose path it is (else the only robot that has all of its joints)
+    /// Robot of the path (default: the only robot that has all of its joints)
     #[arg(long, value_name = "ID")]
     pub(super) robot: Option<String>,
-    /// What comes nearer to the robot is in its way, metres
+    /// Distance below which something is in the way, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.02)]
     pub(super) margin: f64,
-    /// Turning joints of the path are in degrees
+    /// The path states turning joints in degrees
     #[arg(long)]
     pub(super) degrees: bool,
-    /// What a path that passes may leave in doubt
+    /// Doubts that are allowed in a path that passes
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
     pub(super) allow: Vec<PathDoubt>,
-    /// Robot library (else that of the run)
+    /// Robot library (default: that of the run)
     #[arg(long, value_name = "DIR")]
     pub(super) robots: Option<PathBuf>,
-    /// Answer in JSON
+    /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
 }
@@ -200,13 +202,13 @@ pub(super) struct OutFlags {
 
 #[derive(Debug, Args)]
 pub(super) struct HistoryFlags {
-    /// Folder in which output folders of runs and rescans lie
+    /// Folder that contains the output folders of runs and rescans
     #[arg(value_name = "DIR")]
     pub(super) folder: PathBuf,
-    /// Take this session away; the others keep what they share with it
+    /// Remove this session; the others keep the files that they share with it
     #[arg(long, value_name = "NAME")]
     pub(super) remove: Vec<String>,
-    /// Answer in JSON
+    /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
 }
@@ -219,7 +221,7 @@ pub(super) struct DiffFlags {
     /// Output folder of the later run
     #[arg(value_name = "NOW")]
     pub(super) now: PathBuf,
-    /// Answer in JSON
+    /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
 }
@@ -229,7 +231,7 @@ pub(super) struct ReportFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
-    /// Write each robot as a test case: trusted ones pass
+    /// Write each robot as a test case to this JUnit file: trusted ones pass
     #[arg(long, value_name = "FILE")]
     pub(super) junit: Option<PathBuf>,
 }
@@ -239,10 +241,10 @@ pub(super) struct SimulateFlags {
     /// Scene file (TOML)
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
-    /// Where scans and truth go
+    /// Output folder of scans and truth
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// Robot library that the scene's robots are taken from
+    /// Robot library with the models of the scene's robots
     #[arg(long, value_name = "DIR")]
     pub(super) robots: Option<PathBuf>,
 }
@@ -252,7 +254,7 @@ pub(super) struct LintFlags {
     /// Robot library
     #[arg(value_name = "DIR")]
     pub(super) dir: PathBuf,
-    /// Answer in JSON
+    /// Print JSON
     #[arg(long)]
     pub(super) json: bool,
 }
@@ -262,20 +264,21 @@ pub(super) struct CalibrateFlags {
     /// Output folders of runs with --calibrate
     #[arg(required = true, value_name = "OUT")]
     pub(super) results: Vec<PathBuf>,
-    /// Model, as in the library (else the only one that was calibrated)
+    /// Name of the model in the library (default: the only calibrated one)
     #[arg(long, value_name = "NAME")]
     pub(super) model: Option<String>,
-    /// Robots by their ids in the results (else all of the model: they count as one and the same)
+    /// Ids of the robots in the results; they count as one and the same robot (default: all of the
+    /// model)
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     pub(super) robot: Vec<String>,
-    /// Joint values that the controller showed while it was scanned: offsets of its zeros are
-    /// estimated (TOML)
+    /// Readings file (TOML): joint values that the controller showed during the scans, to estimate
+    /// the offsets of its zeros
     #[arg(long, value_name = "FILE")]
     pub(super) readings: Option<PathBuf>,
-    /// Robot library that the model is taken from
+    /// Robot library that contains the model
     #[arg(long, value_name = "DIR")]
     pub(super) robots: PathBuf,
-    /// Where the corrected model goes: a folder of a library
+    /// Output folder of the corrected model, which becomes a robot library
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
 }
@@ -286,28 +289,28 @@ pub(super) struct Common {
     /// Upper bound of resident memory, for example 4GiB
     #[arg(long, global = true, value_name = "SIZE")]
     memory: Option<String>,
-    /// Worker threads (else one a core)
+    /// Number of worker threads (default: one per core)
     #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
-    /// Scanner poses, for formats that carry none (TOML or JSON)
+    /// File of scanner poses (TOML or JSON), for formats without poses
     #[arg(long, global = true, value_name = "FILE")]
     scanners: Option<PathBuf>,
-    /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; one file's own as NAME=UNIT,
-    /// heights apart as us-ft/m, several with commas (else what each file declares, else
-    /// metres)
+    /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; NAME=UNIT for one file,
+    /// us-ft/m for heights in another unit, several separated by commas (default: what each file
+    /// declares, or metres)
     #[arg(long, global = true, value_name = "UNIT")]
     units: Option<String>,
-    /// Settings (TOML)
+    /// Configuration file with settings (TOML)
     #[arg(long, global = true, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// One setting, for example fit.beam=150; goes before the file
+    /// One setting, for example fit.beam=150; takes precedence over the configuration file
     #[arg(long, global = true, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// How postures are found: "beam" (else), or "paper", the method of the source, link after
-    /// link
+    /// Method that finds postures: "beam" (default), or "paper", the link-by-link method of the
+    /// paper
     #[arg(long, global = true, value_name = "NAME")]
     method: Option<String>,
-    /// How progress is shown (else a bar on a terminal, lines elsewhere)
+    /// How progress is shown (default: a bar on a terminal, lines elsewhere)
     #[arg(long, global = true, value_enum, value_name = "HOW")]
     progress: Option<Mode>,
     /// How warnings and errors are written
@@ -316,11 +319,11 @@ pub(super) struct Common {
 }
 
 impl Common {
-    /// Defaults, configuration and flags, put together and checked.
+    /// Combines and checks defaults, configuration and flags.
     pub(super) fn means(&self) -> Result<Means> {
         let method = self.method.iter().map(|name| format!("fit.method={name}"));
         let units = self.units.iter().map(|unit| format!("ingest.units=\"{unit}\""));
-        Means::of(&Given {
+        Means::of(&FlagValues {
             memory: self.memory.clone(),
             threads: self.threads,
             config: self.config.clone(),
@@ -328,31 +331,31 @@ impl Common {
         })
     }
 
-    /// The scanners' file: the flag, else that of the configuration.
+    /// The file of scanner poses: that of the flag, else that of the configuration.
     pub(super) fn scanners(&self, means: &Means) -> Option<PathBuf> {
         self.scanners.clone().or_else(|| means.scanners.clone())
     }
 
-    /// An engine that shows progress and listens to Ctrl-C. Call once.
+    /// An engine that shows progress and reacts to Ctrl-C. It may be created only once.
     pub(super) fn engine(&self, means: &Means) -> Result<Engine> {
         let mut engine = Engine::new(means.n_threads);
         engine.channel_bytes = means.channel_bytes();
         engine.is_narrow = means.is_narrow();
         engine.progress = match (self.progress, self.log_format) {
-            // Nothing but JSON is asked for: bars and lines are for people.
+            // With JSON requested, bars and lines for people are left out.
             (Some(Mode::None), LogFormat::Json) => Progress::json_without_progress(),
             (_, LogFormat::Json) => Progress::new(Mode::Json),
             (mode, LogFormat::Text) => Progress::new(mode.unwrap_or_else(Mode::fitting)),
         };
         engine.cancel.on_ctrl_c()?;
-        // Libraries that use rayon by themselves keep to the same number; a pool made earlier
-        // (tests) is kept.
+        // Libraries that use rayon by themselves get the same number of threads; a pool that exists
+        // already (in tests) is kept.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
         Ok(engine)
     }
 }
 
-/// Refuses names of inputs that are no files, before anything else is done.
+/// Refuses inputs that are not files, before anything else is done.
 pub(super) fn present(inputs: &[PathBuf]) -> Result<()> {
     inputs.iter().try_for_each(|path| ingest::regular(path))
 }

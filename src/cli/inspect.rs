@@ -1,4 +1,4 @@
-//! `inspect`: inputs in; what is in them, and what will be worse for what they lack, out.
+//! The command `inspect`: prints the contents of inputs, and which missing data make results worse.
 
 use super::exit;
 use super::flags::{Common, InspectFlags, present};

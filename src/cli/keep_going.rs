@@ -1,16 +1,16 @@
-//! A job of which parts may fail in; its outcome without those, which are named, out: a plant that
-//! runs overnight is not lost for one broken file.
+//! Runs a job with `--keep-going`: inputs that cannot be read are left out and named, so that one
+//! broken file does not cost the run of a whole plant.
 
 use crate::engine::Engine;
 use crate::job::{Job, Outcome};
 use crate::plan;
 use contract::{Error, Kind, Result};
 
-/// Does the main job; where it is asked for, without the inputs that cannot be read. Tiles of the
+/// Runs the main job, with `--keep-going` without the inputs that cannot be read. Tiles of the
 /// others stay in the store, so that each is read once.
 ///
 /// # Errors
-/// As [`plan::run`]; where failures are forgiven, those of the last input that is left.
+/// Those of [`plan::run`]; with `--keep-going`, the error of the last remaining input.
 pub(super) fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     let mut job = job.clone();
     loop {
@@ -23,7 +23,7 @@ pub(super) fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     }
 }
 
-/// The input that an error is of, where the job can go on without it.
+/// Index of the input that an error is about, if the job can go on without it.
 fn failed(job: &Job, error: &Error) -> Option<usize> {
     let is_of_file = matches!(error.kind(), Kind::BadInput | Kind::Unsupported | Kind::Io);
     if !job.keep_going || !is_of_file || job.inputs.len() < 2 {
@@ -36,10 +36,10 @@ fn failed(job: &Job, error: &Error) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Given, Means};
+    use crate::job::{FlagValues, Means};
 
     fn job(keep_going: bool) -> Job {
-        let means = Means::of(&Given::default()).expect("defaults");
+        let means = Means::of(&FlagValues::default()).expect("defaults");
         let inputs = vec!["a/one.e57".into(), "a/two.e57".into()];
         Job { keep_going, ..Job::new(inputs, "r".into(), "o".into(), means) }
     }

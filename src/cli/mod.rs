@@ -1,5 +1,5 @@
-//! The command line: words of a person in, an exit code out. Results go to standard output,
-//! everything else to standard error.
+//! The command line: parses the arguments, runs the command and returns the exit code. Results are
+//! written to standard output, everything else to standard error.
 
 mod bench;
 mod bench_flags;
@@ -21,7 +21,7 @@ use flags::{Command, Line, RobotsCommand};
 use say::{LogFormat, Say};
 use std::ffi::OsString;
 
-/// Runs the program with these arguments, program name first; gives the exit code.
+/// Runs the program with these arguments (program name first) and returns the exit code.
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
@@ -32,7 +32,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let say = Say::new(line.common.log_format);
     say.for_panics();
     let done = fence::fenced(|| run(&line, &say)).unwrap_or_else(|what| {
-        Err(Error::new(Kind::Bug, format!("the program broke off: {what}"))
+        Err(Error::new(Kind::Bug, format!("the program ended by a panic: {what}"))
             .hint("this is a fault of stillpoint: please report it with its input"))
     });
     done.unwrap_or_else(|error| {
@@ -41,10 +41,11 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     })
 }
 
-/// Says what is wrong with a command line, in the format that it asks for as far as it can be read.
+/// Reports an invalid command line, in the log format that it requests as far as that can be
+/// parsed.
 fn refuse(error: &clap::Error, args: &[OsString]) -> u8 {
     if !error.use_stderr() {
-        // Help and version are errors to clap, but no failures. A closed pipe is none either.
+        // Help and version are errors to clap, but no failures; nor is a closed pipe.
         let _ = error.print();
         return exit::OK;
     }

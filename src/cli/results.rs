@@ -1,6 +1,5 @@
-//! `verify`, `report`, `export`, `check`, `diff` and `history`: output folders of runs in; whether
-//! they are whole, what is in them, their points in other formats, whether a path keeps clear of
-//! them, how they differ and which goes on from which, out.
+//! The commands `verify`, `report`, `export`, `check`, `diff` and `history`, which read results of
+//! earlier runs.
 
 use super::exit;
 use super::flags::{
@@ -61,12 +60,15 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
     Ok(exit::OK)
 }
 
-/// Exit code 0 where the path is free but for what is allowed, 1 where something is in its way, 3
-/// where that is not known.
+/// Checks a path. The exit code is 0 for a path that is free apart from allowed doubts, 1 for one
+/// with an obstacle, and 3 where that is not known.
 pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Result<u8> {
     if !(flags.margin.is_finite() && (0.0..=MAX_MARGIN).contains(&flags.margin)) {
-        return Err(Error::new(Kind::Usage, format!("a margin of {} m is none", flags.margin))
-            .hint(format!("give metres, 0 to {MAX_MARGIN}")));
+        return Err(Error::new(
+            Kind::Usage,
+            format!("a margin of {} m is not possible", flags.margin),
+        )
+        .hint(format!("give metres, 0 to {MAX_MARGIN}")));
     }
     let means = common.means()?;
     let engine = common.engine(&means)?;
@@ -96,7 +98,7 @@ pub(super) fn history(flags: &HistoryFlags, say: &Say) -> Result<u8> {
         history::remove(&flags.folder, name)?;
     }
     let found = history::sessions(&flags.folder)?;
-    // A folder whose last session was just taken away holds none, as was asked for.
+    // A folder whose last session was just removed may be empty.
     if found.sessions.is_empty() && found.damaged.is_empty() && flags.remove.is_empty() {
         return Err(history::no_results(&flags.folder));
     }
@@ -109,7 +111,7 @@ pub(super) fn history(flags: &HistoryFlags, say: &Say) -> Result<u8> {
 pub(super) fn diff(flags: &DiffFlags, say: &Say) -> Result<u8> {
     let (then, now) = (result_of(&flags.then)?, result_of(&flags.now)?);
     let changes = changes(&then, &now);
-    // Where the one goes on from the other, that one knows what else changed.
+    // If one result started from the other, its list of changes has more than robots.
     let digest = VerifiedFiles::open(&flags.then).ok().map(|files| files.digest().to_owned());
     let goes_on = digest.is_some() && now.rescan.as_ref().map(|r| &r.base) == digest.as_ref();
     let things = if goes_on { things(&flags.now)? } else { Vec::new() };
@@ -125,7 +127,7 @@ pub(super) fn diff(flags: &DiffFlags, say: &Say) -> Result<u8> {
     Ok(exit::OK)
 }
 
-/// Things that are not where they were, as a rescan listed them.
+/// Bodies that changed, as a rescan has listed them.
 fn things(out: &Path) -> Result<Vec<ThingEntry>> {
     #[derive(serde::Deserialize)]
     struct Changes {

@@ -1,10 +1,10 @@
-//! `robots lint`: a library in; what is wrong with it, in words or JSON, out. `robots calibrate`:
-//! results in; a corrected model out.
+//! The commands `robots lint`, which reports faults of a library, and `robots calibrate`, which
+//! writes a corrected model.
 
 use super::exit;
 use super::flags::{CalibrateFlags, Common, LintFlags};
 use super::say::Say;
-use crate::detect::calibrate::{Wanted, together};
+use crate::detect::calibrate::{WantedRobots, combine};
 use contract::words::count;
 use contract::{Kind, Result, quote};
 use robot::{Finding, Library, Severity};
@@ -32,12 +32,12 @@ pub(super) fn lint(flags: &LintFlags, common: &Common, say: &Say) -> Result<u8> 
     Ok(if errors > 0 { exit::code(Kind::BadInput) } else { exit::OK })
 }
 
-/// Puts the calibrations of some results together.
+/// Combines the calibrations of some results.
 pub(super) fn calibrate(flags: &CalibrateFlags, common: &Common, say: &Say) -> Result<u8> {
-    let wanted = Wanted { model: flags.model.as_deref(), robots: &flags.robot };
+    let wanted = WantedRobots { model: flags.model.as_deref(), robots: &flags.robot };
     let most = common.means()?.settings.ingest.max_text_bytes;
     let readings = flags.readings.as_deref().map(|file| (file, most));
-    let found = together(&flags.results, &wanted, readings)?;
+    let found = combine(&flags.results, &wanted, readings)?;
     found.write(&flags.robots, &flags.out)?;
     say.result(&found.words(&flags.out));
     Ok(exit::OK)

@@ -1,5 +1,4 @@
-//! `run`, `plan` and `rescan`: flags in, the main job done, or what it would take, or done again
-//! for one cell.
+//! The commands `run`, `plan` and `rescan`.
 
 use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;

@@ -1,6 +1,5 @@
-//! What the program says: results to standard output; warnings and errors to standard error, as
-//! text or JSON. Whatever names hold, no terminal obeys them: all that is said is quoted here
-//! (`contract::quote`).
+//! Output of the program: results on standard output; warnings and errors on standard error, as
+//! text or JSON. All text is quoted (`contract::quote`), so that no name can control a terminal.
 
 use crate::job::Outcome;
 use contract::{Error, Kind, Result, fence, quote};
@@ -9,13 +8,13 @@ use std::io::Write;
 /// How warnings and errors are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum LogFormat {
-    /// For people.
+    /// As text for people.
     Text,
-    /// One object a line, for programs.
+    /// As JSON for programs, one object per line.
     Json,
 }
 
-/// Speaks.
+/// Writes results, warnings and errors.
 pub(super) struct Say {
     format: LogFormat,
 }
@@ -32,9 +31,8 @@ impl Say {
         Self { format }
     }
 
-    /// From now on panics say nothing by themselves: what catches them says it, in this format.
-    /// Developers who ask for the calls that lead to them (`RUST_BACKTRACE`) get these beside
-    /// text.
+    /// Silences the default panic message: the code that catches a panic reports it in this format.
+    /// With `RUST_BACKTRACE` set, developers also get the backtrace beside text.
     pub(super) fn for_panics(&self) {
         let wants_calls = std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0");
         let usual = std::panic::take_hook();
@@ -47,16 +45,16 @@ impl Say {
         }));
     }
 
-    /// A result, on standard output. Nobody listening is no failure of ours.
+    /// Writes a result to standard output. A closed pipe is not an error.
     pub(super) fn result(&self, text: &str) {
         let mut out = std::io::stdout().lock();
         let _ = writeln!(out, "{}", quote::printed(text.trim_end())).and_then(|()| out.flush());
     }
 
-    /// What a run came to: warnings and what was used again on standard error, its summary on
-    /// standard output.
+    /// Writes the outcome of a run: warnings and pieces that were used again to standard error, the
+    /// summary to standard output.
     pub(super) fn outcome(&self, outcome: &Outcome) {
-        outcome.warnings.iter().chain(&outcome.told).for_each(|warning| self.warning(warning));
+        outcome.warnings.iter().chain(&outcome.notes).for_each(|warning| self.warning(warning));
         for piece in &outcome.reused {
             self.line(&match self.format {
                 LogFormat::Text => format!("used again: {piece}"),
@@ -68,7 +66,7 @@ impl Say {
         self.result(&outcome.summary);
     }
 
-    /// Something a person should know.
+    /// Writes a warning.
     pub(super) fn warning(&self, text: &str) {
         self.line(&match self.format {
             LogFormat::Text => format!("warning: {text}"),
@@ -76,7 +74,7 @@ impl Say {
         });
     }
 
-    /// Why the program ends.
+    /// Writes the error that ends the program.
     pub(super) fn error(&self, error: &Error) {
         self.line(&match self.format {
             LogFormat::Text => format!("error: {error}"),

@@ -1,4 +1,4 @@
-//! `simulate`: a scene in; scans and truth out.
+//! The command `simulate`: scans a scene and writes scans and truth.
 
 use super::exit;
 use super::flags::{Common, SimulateFlags};

@@ -1,6 +1,6 @@
-//! Fits in; the same with the places of their joints estimated, and the models so corrected, out:
-//! for robots that their models fit poorly, where it is asked for. And results of several such runs
-//! in; one corrected model out.
+//! Calibration of joint axes for robots that their models fit poorly, on request: each such fit
+//! gets a corrected model of its own. Results of several runs can be combined to one corrected
+//! model.
 
 use super::search::Search;
 use super::tools::take_models;
@@ -20,7 +20,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// The fits, each of its own model, which are added to `models`.
+/// Calibrates each fit. A calibrated fit refers to a corrected model, which is appended to
+/// `models`.
 pub(crate) fn calibrate(
     fits: Vec<Fit>,
     models: &mut Vec<Model>,
@@ -29,7 +30,8 @@ pub(crate) fn calibrate(
 ) -> Result<Vec<Fit>> {
     let known: &[Model] = models;
     let done = engine.fan_out(Task::new("calibrate").large(), fits, |fit| {
-        // All scans are asked here, of which a robot that moved stands only in some.
+        // Calibration uses all scans, and a robot that moved stands at this posture only in some of
+        // them.
         if fit.verdict == Verdict::Refused || !fit.stands_in.is_empty() {
             return Ok((fit, None));
         }
@@ -42,33 +44,33 @@ pub(crate) fn calibrate(
     Ok(take_models(done, models))
 }
 
-/// Which robots of the results are put together.
-pub struct Wanted<'a> {
-    /// Name of the model; the only calibrated one where left out.
+/// Which robots of the results are combined.
+pub struct WantedRobots<'a> {
+    /// Name of the model; `None` for the only calibrated model.
     pub model: Option<&'a str>,
-    /// Ids; all of the model where empty.
+    /// Ids of the robots; all robots of the model where empty.
     pub robots: &'a [String],
 }
 
-/// What several postures say of one robot.
-pub struct Together {
+/// Joint corrections of one robot, combined from several postures.
+pub struct CombinedCalibration {
     model: String,
     n_postures: usize,
     calibration: Calibration,
-    /// Of each joint's zero against the controller's, and standard deviation, where readings were
-    /// given.
+    /// Offset of each joint's zero from the controller's, and its standard deviation, radians or
+    /// metres, where readings were given.
     zeros: BTreeMap<String, [f64; 2]>,
 }
 
-/// A reading of a controller.
+/// Joint values that a controller has shown for one posture.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PostureReading {
-    /// Output folder, as on the command line.
+    /// Output folder of the result, as on the command line.
     result: PathBuf,
-    /// Id of the robot in it.
+    /// Id of the robot in that result.
     robot: String,
-    /// Values, radians or metres.
+    /// Joint values by name, radians or metres.
     joints: BTreeMap<String, f64>,
 }
 
@@ -79,16 +81,16 @@ struct PostureReadings {
     posture: Vec<PostureReading>,
 }
 
-/// Puts together what the results say of the wanted robots; readings are a file and how many bytes
-/// it may have.
+/// Combines the corrections that the results contain for the wanted robots. `readings` is a file
+/// and the most bytes that it may have.
 ///
 /// # Errors
 /// A result that cannot be read, robots of several models, or none that was calibrated.
-pub fn together(
+pub fn combine(
     results: &[PathBuf],
-    wanted: &Wanted<'_>,
+    wanted: &WantedRobots<'_>,
     readings: Option<(&Path, u64)>,
-) -> Result<Together> {
+) -> Result<CombinedCalibration> {
     let mut robots: Vec<(PathBuf, RobotEntry)> = Vec::new();
     for path in results {
         let result = result_of(path)?;
@@ -101,23 +103,32 @@ pub fn together(
     }
     let usage = |what: String, hint: &str| Err(Error::new(Kind::Usage, what).hint(hint));
     let Some((_, first)) = robots.first() else {
-        return usage("no such robot was calibrated".into(), "run with --calibrate first");
+        return usage(
+            "no result has a calibrated robot as wanted".into(),
+            "run with --calibrate first",
+        );
     };
     let model = first.model.clone();
     if let Some((_, other)) = robots.iter().find(|r| r.1.model != model) {
-        return usage(format!("robots of {model} and of {}", other.model), "name one with --model");
+        return usage(
+            format!("the results have calibrated robots of {model} and of {}", other.model),
+            "name one with --model",
+        );
     }
     let own = robots.iter().filter_map(|(_, r)| r.calibration.as_ref().map(|c| c.calibration()));
     let own: Vec<Calibration> = own.collect();
     let Some(calibration) = fit::combine(&own.iter().collect::<Vec<_>>()) else {
-        return usage(format!("the models of {model} have other joints"), "use one library");
+        return usage(
+            format!("the models of {model} differ in their joints between the results"),
+            "make all results with the same robot library",
+        );
     };
     let zeros =
         readings.map(|(file, most)| zeros(file, most, &robots)).transpose()?.unwrap_or_default();
-    Ok(Together { model, n_postures: own.len(), calibration, zeros })
+    Ok(CombinedCalibration { model, n_postures: own.len(), calibration, zeros })
 }
 
-/// Offsets of joints' zeros: weighted means of what was found less what was read.
+/// Offsets of the joints' zeros: weighted means of fitted value less reading.
 fn zeros(
     file: &Path,
     most: u64,
@@ -130,8 +141,9 @@ fn zeros(
     for reading in &readings.posture {
         let is_it = |r: &&(PathBuf, RobotEntry)| r.0 == reading.result && r.1.id == reading.robot;
         let Some((_, robot)) = robots.iter().find(is_it) else {
-            let what = format!("there is no {} in {}", reading.robot, reading.result.display());
-            return Err(bad(what).hint("name results as on the command line"));
+            let what =
+                format!("there is no robot {} in {}", reading.robot, reading.result.display());
+            return Err(bad(what).hint("name the results in the readings as on the command line"));
         };
         for ((name, value), (_, sigma)) in robot.joints.0.iter().zip(&robot.sigma.0) {
             let Some(read) = reading.joints.get(name) else { continue };
@@ -144,13 +156,13 @@ fn zeros(
     Ok(sums.into_iter().map(|(name, [s, w])| (name, [s / w, w.sqrt().recip()])).collect())
 }
 
-impl Together {
-    /// Writes the corrected model into a library: the folder of the given library's model, with the
-    /// joints of its URDF moved, under its own name in `out`.
+impl CombinedCalibration {
+    /// Writes the corrected model to a library: a copy of the model's folder, with the joints of
+    /// its URDF corrected, under its own name in `out`.
     ///
     /// # Errors
-    /// No such model in the library, a folder that is there already or cannot be written, or a URDF
-    /// outside its folder.
+    /// The library has no such model, the folder exists already or cannot be written, or the URDF
+    /// lies outside of its folder.
     pub fn write(&self, library: &Path, out: &Path) -> Result<()> {
         let from = library.join(&self.model);
         let from = from.canonicalize().map_err(|e| Error::from(e).at(from.display()))?;
@@ -161,7 +173,8 @@ impl Together {
         let text = robot::urdf_text(&urdf)?;
         let corrected = robot::correct(&text, &moves).map_err(at)?;
         let Ok(inside) = urdf.strip_prefix(&from) else {
-            let what = format!("the model's URDF is not in its folder {}", from.display());
+            let what =
+                format!("the URDF of the model lies outside of its folder {}", from.display());
             return Err(at(Error::bad_input(what).hint("copy it there and name it in robot.toml")));
         };
         copy_folder::copy_as_new(&from, &out.join(&self.model), |made| {
@@ -169,7 +182,7 @@ impl Together {
         })
     }
 
-    /// For people.
+    /// The corrections as text for people.
     #[must_use]
     pub fn words(&self, out: &Path) -> String {
         let mut text =

@@ -1,5 +1,5 @@
-//! Tiles in; what the scans cover, floor and occupied space out: the lattice stage's map and the
-//! floor stage's fold, joined so that one pass over the tiles serves both.
+//! Floor, planes, occupied space and the covered part of each scan's lattice, computed from all
+//! tiles in one pass that joins the map of stage `lattice` and the fold of stage `floor`.
 
 use crate::engine::Engine;
 use crate::job::Settings;
@@ -8,33 +8,33 @@ use contract::{Fold, Map, Result, Scan, ScanId, TILE_SIDE, Tile, TileSummary, We
 use lattice::{LatticeExtent, Summarise};
 use serde::{Deserialize, Serialize};
 
-/// The map: a tile's summary, and which rows and columns of its scan it covers.
+/// The map: summarises a tile, and finds the rows and columns of its scan that it covers.
 struct Surfaces(Summarise);
 
-/// What one tile leaves behind.
+/// Summary and covered part of one tile.
 struct Surface {
     scan: ScanId,
     extent: Option<LatticeExtent>,
     summary: TileSummary,
 }
 
-/// The fold.
+/// The fold that joins the summaries of all tiles.
 struct GatherGround {
     find: floor::Find,
     n_scans: usize,
 }
 
-/// What all tiles leave behind.
+/// Floor, planes, occupied space and coverage of the whole plant.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct Ground {
     /// Floor, planes and occupied space.
     pub(crate) surfaces: floor::FloorFindings,
-    /// For each scan: the rows and columns of its lattice that it covers.
+    /// For each scan, the rows and columns of its lattice that its points cover.
     pub(crate) extents: Vec<Option<LatticeExtent>>,
 }
 
 impl Ground {
-    /// One pass over the tiles of a store: floor, walls and occupied space.
+    /// Computes the ground in one pass over the tiles of a store.
     ///
     /// # Errors
     /// A damaged tile; cancelled.
@@ -47,10 +47,10 @@ impl Ground {
         Self::gather(Surfaces::new(scans, &settings.lattice), scans, store, settings, engine)
     }
 
-    /// The same without planes: for where floor and walls are known.
+    /// Like [`Ground::of_tiles`], without planes, for runs in which floor and walls are known.
     ///
     /// # Errors
-    /// As of [`Ground::of_tiles`].
+    /// Those of [`Ground::of_tiles`].
     pub(crate) fn without_planes(
         scans: &[Scan],
         store: &Store,
@@ -79,12 +79,12 @@ impl Surfaces {
         Self(Summarise::new(scans, settings))
     }
 
-    /// How much of a tile of the store may be left out.
+    /// How much of a tile's points may be left out (see [`Tile::skip`]).
     fn skip(&self, entry: &TileEntry) -> u32 {
         self.0.skip(entry.at.scan, entry.range)
     }
 
-    /// The same without planes: for where floor and walls are known.
+    /// Like [`Surfaces::new`], without planes, for runs in which floor and walls are known.
     fn without_planes(self) -> Self {
         Self(self.0.without_planes())
     }
@@ -135,9 +135,9 @@ impl Fold for GatherGround {
     }
 }
 
-/// Rows and columns that a tile covers, in its lattice.
+/// Rows and columns of the lattice that a tile covers.
 fn extent(tile: &Tile) -> Option<LatticeExtent> {
-    // Sorted by pixel, so by row.
+    // Points are sorted by pixel and therefore by row.
     let (first, last) = (tile.pixel.first()?, tile.pixel.last()?);
     let cols = tile.pixel.iter().map(|pixel| *pixel as u8);
     let [left, right] =

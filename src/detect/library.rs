@@ -1,4 +1,4 @@
-//! A folder in, the robot library out, its models loaded in parallel.
+//! Loads the models of a robot library in parallel.
 
 use super::robots::RobotList;
 use crate::cache::Cache;
@@ -7,12 +7,13 @@ use contract::{Error, Fit, Result};
 use robot::{Library, Model, Settings};
 use std::path::Path;
 
-/// Models of a library, loadable or not.
+/// Number of models in a library, loadable or not.
 pub(crate) fn count(dir: &Path) -> Result<usize> {
     Ok(Library::open(dir)?.0.len())
 }
 
-/// Bytes of the files of all models; what cannot be read counts nothing. Links are not followed.
+/// Total size of the files of all models, bytes. Unreadable files count as zero, and links are not
+/// followed.
 pub(crate) fn bytes(dir: &Path) -> u64 {
     let (mut sum, mut folders) = (0, Library::open(dir).map(|opened| opened.0).unwrap_or_default());
     while let Some(folder) = folders.pop() {
@@ -27,8 +28,8 @@ pub(crate) fn bytes(dir: &Path) -> u64 {
     sum
 }
 
-/// Loads all models, those that are `kept` from there; those that cannot be loaded are explained in
-/// the library's findings.
+/// Loads all models, from the cache `kept` where they are in it. Models that cannot be loaded are
+/// explained in the library's findings.
 pub(crate) fn load(
     dir: &Path,
     settings: &Settings,
@@ -38,7 +39,7 @@ pub(crate) fn load(
     load_those(dir, |_| true, settings, kept, engine)?.checked(dir)
 }
 
-/// The same of those whose names are wanted; maybe none.
+/// Like [`load`], for models with these names only; none of them may exist.
 pub(crate) fn load_those(
     dir: &Path,
     is_wanted: impl Fn(&str) -> bool,
@@ -52,8 +53,7 @@ pub(crate) fn load_those(
         let load = || {
             let bare = Settings { clouds: false, ..*settings };
             let (mut model, findings) = Library::load_folder(dir, &folder, &bare);
-            // A library has few models, and one of them is the largest: its links are sampled side
-            // by side.
+            // A library has few models, and one is the largest: its links are sampled in parallel.
             if let (Some(model), true) = (&mut model, settings.clouds) {
                 model.sample(settings, &AllThreads);
             }
@@ -68,22 +68,23 @@ pub(crate) fn load_those(
     Ok(library)
 }
 
-/// Robots of an earlier result, with their models rebuilt from a library: those with tools, with
-/// other loops or calibrated after its own.
+/// The robots of an earlier result, with their models rebuilt from a library: those with tools,
+/// with loops in another solution, or calibrated.
 ///
 /// # Errors
-/// A model that the library no longer has.
+/// The library no longer has a model of the result.
 pub(crate) fn robots_of(mut fits: Vec<Fit>, library: &Library) -> Result<RobotList> {
     let mut models = library.models.clone();
     fits.iter_mut().try_for_each(|fit| own_model(fit, library, &mut models))?;
     Ok(RobotList { fits, models })
 }
 
-/// Sets the model of a fit, and of the same robot as it stood in other scans; one that is no model
-/// of the library is added.
+/// Sets the model of a fit and of the same robot in other scans; a model that is not in the library
+/// is appended to `models`.
 fn own_model(fit: &mut Fit, library: &Library, models: &mut Vec<Model>) -> Result<()> {
     let missing = |name: &str| {
-        let what = format!("the library has no model \"{name}\", which the earlier result found");
+        let what =
+            format!("the library has no model \"{name}\", which the earlier result refers to");
         Error::bad_input(what).hint("give the library of the earlier run with --robots")
     };
     let known = |name: &str| library.model(name).ok_or_else(|| missing(name));

@@ -1,5 +1,5 @@
-//! Tiles in, robots out: ground and occupied space, the search of each region, tools on flanges,
-//! joints calibrated where that is asked for, and what a person knows of the robots.
+//! Finds the robots in the tiles: ground and occupied space, the search of each region, tools on
+//! flanges, calibration of joints on request, and the review by a person.
 
 pub mod calibrate;
 pub(crate) mod ground;

@@ -1,5 +1,5 @@
-//! Regions whose search fails by a fault of the program in; what to say of each, and the result of
-//! the others, out: where a job keeps going, one region does not cost the run.
+//! Handles regions whose search fails by a fault of the program: with `--keep-going` the failure
+//! becomes a message and the other regions are kept.
 
 use crate::engine::guarded;
 use crate::job::Job;
@@ -7,7 +7,7 @@ use contract::{Kind, Region, Result};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-/// Regions that failed, in words, by their place.
+/// Messages about failed regions, by their position.
 pub(crate) struct RegionFailures {
     is_forgiving: bool,
     list: Mutex<BTreeMap<String, String>>,
@@ -18,8 +18,8 @@ impl RegionFailures {
         Self { is_forgiving: job.keep_going, list: Mutex::default() }
     }
 
-    /// What `work` makes of a region; nothing where it fails by a fault of ours, and that is
-    /// forgiven.
+    /// Runs `work` for a region. If it fails by a fault of the program and the job keeps going, the
+    /// failure is recorded and the default value is returned.
     pub(crate) fn spare<T: Default>(
         &self,
         region: &Region,
@@ -31,8 +31,9 @@ impl RegionFailures {
         match guarded("fit", 0, work) {
             Err(error) if error.kind() == Kind::Bug => {
                 let [x, y, z] = region.world_bounds().center().coords.into();
-                let what =
-                    format!("no robot is looked for near ({x:.1}, {y:.1}, {z:.1}) m: {error}");
+                let what = format!(
+                    "the search for robots near ({x:.1}, {y:.1}, {z:.1}) m failed and was left out: {error}"
+                );
                 let mut list = self.list.lock().expect("nobody panics while he holds the list");
                 list.insert(format!("{region:?}"), what);
                 Ok(T::default())
@@ -41,8 +42,8 @@ impl RegionFailures {
         }
     }
 
-    /// All that was left out, in the order of inputs and places.
-    pub(crate) fn said(self, job: &Job) -> Vec<String> {
+    /// Messages about everything that was left out, in the order of inputs and positions.
+    pub(crate) fn messages(self, job: &Job) -> Vec<String> {
         let list = self.list.into_inner().unwrap_or_default();
         job.left_out.iter().cloned().chain(list.into_values()).collect()
     }
@@ -51,12 +52,12 @@ impl RegionFailures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Given, Means};
+    use crate::job::{FlagValues, Means};
     use contract::Error;
     use geometry::{Aabb, Point};
 
     fn job(keep_going: bool) -> Job {
-        let means = Means::of(&Given::default()).expect("defaults");
+        let means = Means::of(&FlagValues::default()).expect("defaults");
         let inputs = vec!["a/one.e57".into(), "a/two.e57".into()];
         Job { keep_going, ..Job::new(inputs, "r".into(), "o".into(), means) }
     }
@@ -71,7 +72,7 @@ mod tests {
         let none: Vec<u8> = failures.spare(&region, || panic!("a fault")).expect("forgiven");
         assert!(none.is_empty());
         assert!(failures.spare(&region, || Err::<u8, _>(Error::new(Kind::Io, "disk"))).is_err());
-        let said = failures.said(&job(true));
+        let said = failures.messages(&job(true));
         assert!(said.len() == 1 && said[0].contains("(4.0, 0.0, 0.0)"), "{said:?}");
         let strict = RegionFailures::of(&job(false));
         assert!(strict.spare(&region, || Err::<u8, _>(Error::new(Kind::Bug, "fault"))).is_err());

@@ -1,17 +1,17 @@
-//! What a person knows of the robots, as a file in; the fits with that applied, and what each entry
-//! of the file did, out.
+//! A review: the TOML file in which a person states what is known of robots, and how its entries
+//! change the fits.
 //!
 //! ```toml
-//! [[robot]]                     # one for each place that something is known of
-//! at = [2.7, 0.0, 0.3]          # near its base, world, metres
-//! radius = 0.5                  # how near, metres
-//! model = "kuka_kr10"           # no other model stands here
-//! verdict = "accept"            # or "reject": no robot stands here; left out: as the program finds
-//! joints = { joint_1 = 0.35 }   # near which posture it stands, radians or metres: the fit begins there; other joints as found, else 0
-//! rpy = [0.0, 0.0, 1.57]        # with joints: `at` is its base, so turned (URDF, radians); else the base that was found
+//! [[robot]]                     # one entry for each place
+//! at = [2.7, 0.0, 0.3]          # a point near the base, world frame, metres
+//! radius = 0.5                  # greatest distance of the base from that point, metres
+//! model = "kuka_kr10"           # the only model that may stand here
+//! verdict = "accept"            # or "reject": no robot stands here; without it as found
+//! joints = { joint_1 = 0.35 }   # start of the fit, radians or metres; others as found, else 0
+//! rpy = [0.0, 0.0, 1.57]        # with joints: orientation of the base, whose origin is `at`
 //! ```
 //!
-//! The file is the user's and is given again with every run, so what it says survives reruns.
+//! The user keeps the file and passes it to every run, so that its statements survive reruns.
 
 mod effects;
 
@@ -28,50 +28,50 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// How near a base must be to the place given, metres.
+/// Default of `radius`: how near a base must be to the place of an entry, metres.
 const RADIUS: f64 = 0.5;
 
-/// The whole file.
+/// All entries of a review.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Review {
-    /// What is known, place by place.
+    /// The entries, one for each place.
     #[serde(default, rename = "robot")]
     pub places: Vec<ReviewPlace>,
 }
 
-/// What is known of one place.
+/// An entry of a review: what a person knows of one place.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReviewPlace {
-    /// Near the base, world, metres.
+    /// A point near the base, world frame, metres.
     pub at: [f64; 3],
-    /// How near, metres.
+    /// Greatest distance of the base from that point, metres.
     #[serde(default = "radius")]
     pub radius: f64,
-    /// The only model that may stand there.
+    /// The only model that may stand there, if it is known.
     #[serde(default)]
     pub model: Option<String>,
-    /// What a person decided.
+    /// Decision of the person, if there is one.
     #[serde(default)]
     pub verdict: Option<Decision>,
-    /// Values of joints near which it stands, by name, radians or metres; empty where that is not
-    /// known.
+    /// Joint values near which the robot stands, by name, radians or metres; empty where they are
+    /// not known.
     #[serde(default)]
     pub joints: BTreeMap<String, f64>,
-    /// How its base is turned, roll, pitch and yaw as in URDF, radians; [`ReviewPlace::at`] is the
-    /// base itself then.
+    /// Orientation of the base, roll, pitch and yaw as in URDF, radians; [`ReviewPlace::at`] is
+    /// then the origin of the base.
     #[serde(default)]
     pub rpy: Option<[f64; 3]>,
 }
 
-/// What a person decided of a robot.
+/// Decision of a person about a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decision {
-    /// It stands there, as found.
+    /// The robot stands there as it was found.
     Accept,
-    /// Nothing stands there.
+    /// No robot stands there.
     Reject,
 }
 
@@ -80,10 +80,10 @@ fn radius() -> f64 {
 }
 
 impl Review {
-    /// What is known of the robots of a job; nothing where it names no review.
+    /// The review of a job; empty where the job names none.
     ///
     /// # Errors
-    /// As of [`Review::read`].
+    /// Those of [`Review::read`].
     pub(crate) fn of(job: &Job, models: &[Model]) -> Result<Self> {
         let most = job.means.settings.ingest.max_text_bytes;
         let read = |path: &PathBuf| Self::read(path, models, most);
@@ -93,8 +93,8 @@ impl Review {
     /// Reads a review.
     ///
     /// # Errors
-    /// A file that cannot be read or has more than `most` bytes, is no review, or names a model
-    /// that the library has not.
+    /// A file that cannot be read, has more than `most` bytes, is not a review, or names a model
+    /// that the library does not have.
     pub fn read(path: &Path, models: &[Model], most: u64) -> Result<Self> {
         let bad = |what: String| {
             Error::bad_input(what)
@@ -112,8 +112,8 @@ impl Review {
         Ok(review)
     }
 
-    /// The fits of all candidates, those from postures that are given in the place of others; and
-    /// the numbers of the entries whose posture the scans do not bear out.
+    /// The fits of all candidates after fits from given postures have replaced others, and the
+    /// indices of entries whose posture the scans contradict.
     pub(crate) fn correct(
         &self,
         mut fits: Vec<Fit>,
@@ -147,8 +147,8 @@ impl Review {
         Ok((fits, wrong))
     }
 
-    /// The fits of all candidates with what is known applied: where a robot is accepted, it alone
-    /// is left.
+    /// The fits of all candidates after the review: an accepted robot stays as the only one at its
+    /// place.
     #[must_use]
     pub fn apply(&self, mut fits: Vec<Fit>) -> Vec<Fit> {
         for place in &self.places {
@@ -173,8 +173,8 @@ impl Review {
         fits
     }
 
-    /// The robots that would be reported without the review, for [`Review::did`]; none where it has
-    /// no entry.
+    /// The robots that would be reported without the review, for [`Review::effects`]; empty for a
+    /// review without entries.
     #[must_use]
     pub(crate) fn without(&self, found: &[Fit], models: &[Model]) -> Vec<Fit> {
         if self.places.is_empty() {
@@ -184,13 +184,13 @@ impl Review {
         }
     }
 
-    /// Whether somebody accepts a fit.
+    /// Whether an entry accepts a fit.
     #[must_use]
     pub fn accepts(&self, fit: &Fit) -> bool {
         self.places.iter().any(|p| p.verdict == Some(Decision::Accept) && p.has(fit))
     }
 
-    /// Trusts what is accepted, whatever was found out about it since.
+    /// Sets accepted fits to trusted, whatever later checks have found.
     pub fn accept(&self, fits: &mut [Fit]) {
         for fit in fits.iter_mut().filter(|f| self.accepts(f)) {
             verdict::apply(fit, &VerdictEvent::Accepted);
@@ -199,7 +199,10 @@ impl Review {
 }
 
 impl ReviewPlace {
-    /// Whether all of the entry with this number can be; else what cannot.
+    /// Checks the values of an entry; `number` counts from 1.
+    ///
+    /// # Errors
+    /// The first value that is not possible, as a message.
     fn check(&self, number: usize, models: &[Model]) -> std::result::Result<(), String> {
         let numbers = self.at.iter().chain([&self.radius]).chain(self.joints.values());
         if !numbers.chain(self.rpy.iter().flatten()).all(|v| v.is_finite()) || self.radius <= 0.0 {
@@ -207,13 +210,13 @@ impl ReviewPlace {
             return Err(format!("entry {number}, near {}: {what}", self.words()));
         }
         if self.rpy.is_some() && self.joints.is_empty() {
-            return Err(format!("rpy near {} belongs to no joints: give them, too", self.words()));
+            return Err(format!("rpy near {} needs joints: give them as well", self.words()));
         }
         let Some(name) = &self.model else {
             return if self.joints.is_empty() {
                 Ok(())
             } else {
-                Err(format!("joints near {} belong to no model: give it, too", self.words()))
+                Err(format!("joints near {} need a model: give it as well", self.words()))
             };
         };
         let Some(model) = models.iter().find(|m| m.name == *name) else {
@@ -228,20 +231,20 @@ impl ReviewPlace {
         }
     }
 
-    /// The fit that explains most here, by its place in the list.
+    /// Index of the fit at this place that explains most points.
     fn best(&self, fits: &[Fit]) -> Option<usize> {
         let here = fits.iter().enumerate().filter(|(_, f)| self.has(f));
         here.max_by(|(_, a), (_, b)| by_rank(a, b)).map(|(at, _)| at)
     }
 
-    /// Whether a fit stands here.
+    /// Whether the base of a fit lies at this place.
     fn has(&self, fit: &Fit) -> bool {
         let base = Point::from(fit.world_from_base.translation.vector);
         (base - Point::from(self.at)).norm() <= self.radius
     }
 
-    /// What the fit of the posture that is given begins with: on the base that is given, else that
-    /// of the best fit here.
+    /// The start of the fit from the given posture: on the given base, else on that of the best fit
+    /// here.
     fn start(&self, fits: &[Fit], models: &[Model]) -> Option<Fit> {
         let index = models.iter().position(|m| Some(&m.name) == self.model.as_ref())?;
         let own = fits.iter().filter(|f| f.model == index && self.has(f));
@@ -254,7 +257,7 @@ impl ReviewPlace {
             }
         };
         let model = &models[index];
-        // They belong to the base that was found.
+        // The joint values belong to the base that was found.
         let best = best.filter(|_| self.rpy.is_none());
         let found = |name: &str| best?.joints.iter().find(|j| j.name == name).map(|j| j.value);
         let joint = |&joint: &usize| {
@@ -272,14 +275,14 @@ impl ReviewPlace {
         })
     }
 
-    /// The place for people.
+    /// The position as text, metres.
     fn words(&self) -> String {
         triple(self.at, 2)
     }
 }
 
-/// What is refused stands behind all else, as people are not shown it; then what explains more goes
-/// first.
+/// Order of fits: refused ones last, since they are not reported; otherwise those that explain more
+/// points first.
 fn by_rank(a: &Fit, b: &Fit) -> std::cmp::Ordering {
     let stands = |f: &Fit| f.verdict != Verdict::Refused;
     stands(a).cmp(&stands(b)).then_with(|| a.explained.total_cmp(&b.explained))
@@ -374,15 +377,15 @@ mod tests {
         let left: Vec<(&str, Verdict)> = fits.iter().map(|f| (&*f.model_name, f.verdict)).collect();
         assert_eq!(left, [("b", Verdict::Trusted), ("a", Verdict::Doubtful)]);
         assert_eq!(fits[0].reasons, ["accepted in review"]);
-        // Without a model the best is meant, and its rivals stand back.
+        // An entry without a model means the best fit, and its rivals become doubtful.
         let review = Review { places: vec![place(0.0, None, Some(Decision::Accept))] };
         let mut fits = review.apply(vec![fit("a", 0.1, 2.0), fit("b", -0.1, 1.9)]);
         assert_eq!(fits.len(), 1);
         assert!(review.accepts(&fits[0]) && fits[0].model_name == "a");
-        // What was refused was shown to nobody.
+        // A refused fit was never reported, so the entry cannot mean it.
         let refused = Fit { verdict: Verdict::Refused, ..fit("a", 0.1, 3.0) };
         assert_eq!(review.apply(vec![refused, fit("b", -0.1, 1.9)])[0].model_name, "b");
-        // What a tool on its flange brings up since does not undo it.
+        // Reasons that the fit of a tool adds later do not undo it.
         (fits[0].verdict, fits[0].reasons) = (Verdict::Doubtful, vec!["few points".into()]);
         review.accept(&mut fits);
         assert_eq!(fits[0].verdict, Verdict::Trusted);

@@ -1,6 +1,6 @@
-//! The place of a robot among the fits in; what every file and message calls it, out.
+//! Ids of robots, which all files and messages use.
 
-/// What a robot is called, by its place among the fits.
+/// The id of a robot (`R1`, `R2`, …) by its index among the fits.
 pub(crate) fn robot_id(index: usize) -> String {
     format!("R{}", index + 1)
 }

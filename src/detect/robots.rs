@@ -1,24 +1,25 @@
-//! The fits of a plant, with the models that they are of.
+//! The fits of a plant together with their models.
 
 use contract::Fit;
 use robot::Model;
 
-/// Robots of a plant, to be read.
+/// Fits of a plant and their models, borrowed.
 #[derive(Clone, Copy)]
 pub(crate) struct FittedRobots<'a> {
     pub(crate) fits: &'a [Fit],
-    /// Models of the library and, after them, those with a tool, other loops or calibrated joints.
+    /// Models of the library, followed by models with a tool, with loops in another solution, or
+    /// with calibrated joints.
     pub(crate) models: &'a [Model],
 }
 
-/// Robots of a plant, to be changed: a fit of a model of its own adds that model.
+/// Fits of a plant and their models, owned; a fit with a model of its own appends that model.
 pub(crate) struct RobotList {
     pub(crate) fits: Vec<Fit>,
     pub(crate) models: Vec<Model>,
 }
 
 impl RobotList {
-    /// The same, to be read.
+    /// Borrows fits and models.
     pub(crate) fn view(&self) -> FittedRobots<'_> {
         FittedRobots { fits: &self.fits, models: &self.models }
     }

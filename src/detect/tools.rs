@@ -1,5 +1,5 @@
-//! Fits of arms and a library with tools in; fits of arms with what hangs on their flanges out, and
-//! the models that these fits are of.
+//! Finds tools on the flanges of fitted arms. A fit with a tool refers to a model of arm and tool,
+//! which is added to the models.
 
 use super::search::{PreparedLibrary, Search};
 use crate::engine::{AllThreads, Engine, Task};
@@ -8,15 +8,15 @@ use fit::{ArmWithTool, MeasuredScene, Prepared, Settings, Tooled};
 use robot::Model;
 use std::f64::consts::{FRAC_PI_4, FRAC_PI_6, TAU};
 
-/// A tool stands at a multiple of 30° or 45° about the flange: bolt circles have 4, 6, 8 or 12
-/// holes.
+/// Steps of the turn of a tool about its flange, radians (30° and 45°): bolt circles have 4, 6, 8
+/// or 12 holes.
 const MOUNTS: [f64; 2] = [FRAC_PI_6, FRAC_PI_4];
-/// Most other holes that are named.
+/// Most alternative holes that a message names.
 const MAX_NAMED: usize = 3;
-/// Fewest points on a tool: with less, a corner of any part will do.
+/// Fewest points on a tool: fewer could lie on the corner of any part.
 const MIN_POINTS: usize = 80;
 
-/// Gives fits whose loops stand otherwise than the library's model has them a model of their own.
+/// Gives each fit whose loops have another solution than the library's model a model of its own.
 pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
     for fit in &mut fits {
         if !fit.other_branches.is_empty() {
@@ -28,7 +28,8 @@ pub(crate) fn branch(mut fits: Vec<Fit>, models: &mut Vec<Model>) -> Vec<Fit> {
     fits
 }
 
-/// The fits, those with a tool replaced by fits of both, whose models are added to `models`.
+/// Replaces fits of arms that have a tool by fits of arm and tool, whose models are appended to
+/// `models`.
 pub(crate) fn attach_tools(
     fits: Vec<Fit>,
     models: &mut Vec<Model>,
@@ -52,12 +53,13 @@ pub(crate) fn attach_tools(
             Ok(attached.flatten())
         };
         let attached = search.get_or_compute(&format!("tool of {fit:?}"), find)?;
-        Ok(own(fit, arm, attached, known))
+        Ok(with_tool_model(fit, arm, attached, known))
     })?;
     Ok(take_models(attached, models))
 }
 
-/// The same for a fit of one scene; with the model that it is of, where that is none of these.
+/// Finds the tool of a fit in one scene; returns the fit, and its model where that is not one of
+/// `models`.
 pub(crate) fn attach_tools_in(
     scene: &MeasuredScene<'_>,
     fit: Fit,
@@ -70,18 +72,18 @@ pub(crate) fn attach_tools_in(
     let arm = branched.as_ref().unwrap_or(&models[fit.model]);
     let attach = || attach_one(&fit, arm, models, library, scene, settings);
     let attached = tells_tools(&fit).then(attach).flatten();
-    let (fit, tooled) = own(fit, arm, attached, models);
+    let (fit, tooled) = with_tool_model(fit, arm, attached, models);
     (fit, tooled.or(branched))
 }
 
-/// Whether tools are looked for: of a robot that moved, the scans of one posture may show too
-/// little of one.
+/// Whether tools are searched: for a robot that moved, the scans of one posture may show too little
+/// of a tool.
 fn tells_tools(fit: &Fit) -> bool {
     fit.verdict != Verdict::Refused && fit.stands_in.is_empty()
 }
 
-/// The fit with the tool that was found, and the model of both.
-fn own(
+/// The fit with the tool that was found, and the model of arm and tool.
+fn with_tool_model(
     fit: Fit,
     arm: &Model,
     attached: Option<WithTool>,
@@ -91,11 +93,11 @@ fn own(
     (together, Some(arm.with_tool(&models[tool], flange, mount)))
 }
 
-/// A fit of arm and tool, the tool's number in the library and the link that it hangs on, and its
-/// turn about it, radians.
+/// A fit of arm and tool; the indices of the tool in the library and of the link that carries it;
+/// and the turn of the tool about the flange, radians.
 type WithTool = (Fit, [usize; 2], f64);
 
-/// The fits, those with a model of their own pointing at it among `models`.
+/// Appends the models that fits bring along to `models`, and returns the fits with indices into it.
 pub(crate) fn take_models(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Model>) -> Vec<Fit> {
     let own = |(mut fit, model): (Fit, Option<Model>)| {
         if let Some(model) = model {
@@ -107,7 +109,7 @@ pub(crate) fn take_models(fits: Vec<(Fit, Option<Model>)>, models: &mut Vec<Mode
     fits.into_iter().map(own).collect()
 }
 
-/// One arm: the tool that explains most, if one is there.
+/// Finds the tool that explains most points on the flanges of one arm, if there is one.
 fn attach_one(
     fit: &Fit,
     arm: &Model,
@@ -116,7 +118,7 @@ fn attach_one(
     scene: &MeasuredScene<'_>,
     settings: &Settings,
 ) -> Option<WithTool> {
-    // An arm whose loops stand otherwise has the links of its name.
+    // A model with other loops has the links of the library's model with the same name.
     let bare = models.iter().position(|m| m.name == arm.name).unwrap_or(fit.model);
     let bare = library.prepared(bare);
     let n_arm = arm.free.len();
@@ -128,7 +130,8 @@ fn attach_one(
     let turns: Vec<f64> = holes.iter().map(|mount| way * mount).collect();
     let tooled = with_arm(&prepared, arm);
     let bolts = fit::bolt(&start, tooled, &turns, scene, settings, &AllThreads);
-    // Where the flange does not tell, the first hole has it, and the last joint takes up the rest.
+    // Where the points do not tell the hole, the first one is assumed and the last joint absorbs
+    // the turn.
     let bolt = bolts.iter().find(|b| b.hole == 0).or(bolts.first());
     let mount = bolt.map_or(0.0, |bolt| {
         start.posture[n_arm - 1] = bolt.value;
@@ -162,8 +165,8 @@ fn attach_one(
     Some((together, [tool, flange], mount))
 }
 
-/// The tool that explains most of what hangs on one of the arm's flanges, if one is there: its
-/// number and the flange's link, and where it stands. `bare` is the arm.
+/// The tool that explains most points on one of the arm's flanges, if there is one: its index, the
+/// flange's link, and its pose. `bare` is the arm.
 fn best_tool(
     fit: &Fit,
     arm: &Model,
@@ -189,13 +192,13 @@ fn best_tool(
     best
 }
 
-/// An arm with a tool, of which it knows what is the arm's.
+/// An arm with its tool, and how many of its joints and links are the arm's.
 fn with_arm<'a>(prepared: &'a Prepared<'a>, arm: &Model) -> ArmWithTool<'a> {
     ArmWithTool { prepared, n_joints: arm.free.len(), n_links: arm.links.len() }
 }
 
-/// The arm's last joint may be as far off as at the other holes, each with the joint's value there,
-/// radians: the tool's place is known, not what of it is the hole's and what the joint's.
+/// Widens the last joint by its values at alternative holes, radians: the pose of the tool is
+/// known, but not how it divides into hole and joint.
 fn widen(last: &mut JointFit, alike: &[[f64; 2]]) {
     let apart = alike.iter().map(|[_, value]| geometry::angle::apart(*value, last.value));
     let spread = apart.fold(0.0, f64::max);
@@ -205,7 +208,7 @@ fn widen(last: &mut JointFit, alike: &[[f64; 2]]) {
     last.sigma = last.sigma.max(spread);
 }
 
-/// What is said where a flange looks the same at several holes.
+/// Message for a tool that fits equally at several holes.
 fn in_words(alike: &[[f64; 2]]) -> Option<String> {
     let mut holes: Vec<f64> = alike.iter().map(|a| a[0].to_degrees()).collect();
     holes.sort_by(f64::total_cmp);
@@ -214,11 +217,11 @@ fn in_words(alike: &[[f64; 2]]) -> Option<String> {
     let more = if holes.len() > MAX_NAMED { ", …" } else { "" };
     (!named.is_empty()).then(|| {
         let named = named.join(", ");
-        format!("the tool may as well be bolted on at {named}{more}, the last joint turned back")
+        format!("the tool may also be bolted on at {named}{more}, with the last joint turned back")
     })
 }
 
-/// All turns that a tool may be bolted on at, 0 first, radians.
+/// All turns of a tool about its flange, 0 first, radians.
 fn holes() -> Vec<f64> {
     let all = MOUNTS.iter().flat_map(|step| {
         let n = (TAU / step).round() as usize;

@@ -1,6 +1,6 @@
-//! Items, points and bytes: how much a stage has to do, and how much of it is done.
+//! Amounts of work: items, points and bytes of a stage, as a total or as the part that is done.
 
-/// Items, points and bytes; as a total, zero means not known.
+/// Items, points and bytes. In a total, zero means that the number is not known.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Amount {
     /// Number of items (strips, tiles, candidates).
@@ -12,20 +12,20 @@ pub struct Amount {
 }
 
 impl Amount {
-    /// So many items.
+    /// An amount of `items` items, with points and bytes not known.
     #[must_use]
     pub fn items(items: u64) -> Self {
         Self { items, ..Self::default() }
     }
 
-    /// So many points.
+    /// An amount of `points` points, with items and bytes not known.
     #[must_use]
     pub fn points(points: u64) -> Self {
         Self { points, ..Self::default() }
     }
 
-    /// Share of `total` that is done, 0..1, by the first of points, bytes, items whose total is
-    /// known.
+    /// Share of `total` that is done, 0 to 1, computed from the first of points, bytes and items
+    /// whose total is known; `None` where no total is known.
     #[must_use]
     pub fn share(&self, total: &Self) -> Option<f64> {
         [(self.points, total.points), (self.bytes, total.bytes), (self.items, total.items)]

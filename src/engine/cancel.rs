@@ -1,4 +1,4 @@
-//! Cancellation: somebody presses Ctrl-C, every loop of the engine learns of it.
+//! Cancellation of a run: a shared flag that Ctrl-C sets and that every loop of the engine checks.
 
 use contract::{Error, Kind, Result};
 use std::sync::Arc;
@@ -8,28 +8,28 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[derive(Debug, Clone, Default)]
 pub struct Cancel(Arc<AtomicBool>);
 
-/// What a shell expects of a program that was interrupted.
+/// Exit code that shells expect of an interrupted program (128 + SIGINT).
 const EXIT_INTERRUPTED: i32 = 130;
 
 impl Cancel {
-    /// Not yet set.
+    /// A flag that is not set.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Ends the run soon.
+    /// Sets the flag: the run ends at its next check.
     pub fn set(&self) {
         self.0.store(true, Ordering::SeqCst);
     }
 
-    /// Whether the run is to end.
+    /// Whether the flag is set.
     #[must_use]
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// An error once the run is to end.
+    /// Returns an error of kind [`Kind::Cancelled`] once the flag is set.
     pub fn check(&self) -> Result<()> {
         if self.is_set() { Err(Self::error()) } else { Ok(()) }
     }
@@ -44,7 +44,9 @@ impl Cancel {
             }
             flag.set();
         })
-        .map_err(|e| Error::new(Kind::Io, "Ctrl-C cannot be listened to").because(e))
+        .map_err(|e| {
+            Error::new(Kind::Io, "the handler for Ctrl-C could not be installed").because(e)
+        })
     }
 
     pub(super) fn error() -> Error {

@@ -1,56 +1,57 @@
-//! An edge joins two steps: numbered items in, in any order; the same items out, in order. Bounded
-//! by bytes.
+//! An edge joins two steps of a pass. Producers put numbered items into it in any order, and the
+//! consumer takes them in ascending order. The bytes of the items that wait are bounded.
 //!
-//! One window serves as channel and as reordering buffer. Whoever holds the item that is next out
-//! never waits, so that the window cannot lock up; everybody else waits while the window is full.
-//! It therefore keeps at most `cap_bytes` and one more item. An item heavier than the window
-//! travels alone.
+//! One window serves both as channel and as reordering buffer. A producer that holds the next item
+//! to be taken never waits, so the window cannot deadlock; all other producers wait while the
+//! window is full. The window therefore keeps at most `cap_bytes` and one more item. An item
+//! heavier than the window is passed on alone.
 
 use super::progress::Stage;
 use contract::{Error, Kind, Result};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Least weight of an item, bytes: its place in the window is not free, so that weightless items
-/// are bounded too.
+/// Least weight of an item, bytes. An item without weight occupies a slot of the window, too, so
+/// the number of such items must be bounded.
 const LEAST_WEIGHT_BYTES: usize = 64;
 
 struct Edge<T> {
     state: Mutex<EdgeState<T>>,
-    /// The window has become emptier, or the next item another.
+    /// Signalled when the window has more room, or when another item is the next.
     room: Condvar,
-    /// The next item has come, or no more will.
+    /// Signalled when the next item is there, or when no more items will come.
     ready: Condvar,
     cap_bytes: usize,
 }
 
 struct EdgeState<T> {
-    /// Items from position `next` on, with their weights; `None` where not yet come.
+    /// Items from position `next` on, with their weights in bytes; `None` where an item is still
+    /// missing.
     window: VecDeque<Option<(Result<T>, usize)>>,
-    /// Position of the next item out.
+    /// Position of the next item to be taken.
     next: u64,
-    /// Weight of the window.
+    /// Sum of the weights in the window, bytes.
     bytes: usize,
-    /// Producers that may still put.
+    /// Number of producers that are still alive.
     n_producers: usize,
-    /// The lowest position that failed; items after it are of no use.
+    /// The lowest position whose item is an error; items after it are dropped.
     failed: u64,
-    /// The consumer has gone.
+    /// Whether the consumer was dropped.
     gone: bool,
 }
 
 impl<T> Edge<T> {
-    /// Nothing panics while it holds this lock (items are dropped outside), so poison means
-    /// nothing.
+    /// Poisoning is ignored: no thread panics while it holds this lock, since items are dropped
+    /// outside of it.
     fn lock(&self) -> MutexGuard<'_, EdgeState<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The producer's end; a clone is another producer.
+/// The producer's end of an edge. A clone is another producer.
 pub(super) struct Put<T>(Arc<Edge<T>>);
 
-/// The consumer's end; when the last clone of its `Arc` is dropped, producers are told to stop.
+/// The consumer's end of an edge. When the last clone of its `Arc` is dropped, the producers stop.
 pub(super) struct Take<T> {
     edge: Arc<Edge<T>>,
     tally: Option<(Stage, Measure<T>)>,
@@ -59,7 +60,7 @@ pub(super) struct Take<T> {
 /// Points and bytes of an item.
 pub(super) type Measure<T> = fn(&T) -> (u64, u64);
 
-/// A new edge that keeps about `cap_bytes`.
+/// Makes an edge whose window keeps about `cap_bytes`.
 pub(super) fn edge<T>(cap_bytes: usize) -> (Put<T>, Take<T>) {
     let state = EdgeState {
         window: VecDeque::new(),
@@ -78,17 +79,18 @@ pub(super) fn edge<T>(cap_bytes: usize) -> (Put<T>, Take<T>) {
     (Put(Arc::clone(&edge)), Take { edge, tally: None })
 }
 
-/// Whether a producer should go on.
+/// Whether a producer should put more items.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Onward {
-    /// More is welcome.
+    /// The edge accepts more items.
     Yes,
     /// The consumer has gone, or an earlier item has failed.
     Stop,
 }
 
 impl<T> Put<T> {
-    /// Hands over the item of position `at`, waiting for room. Each position is put once.
+    /// Puts the item of position `at`, of `weight_bytes` bytes, and waits while the window is full.
+    /// Each position must be put exactly once.
     pub(super) fn put(&self, at: u64, item: Result<T>, weight_bytes: usize) -> Onward {
         let weight = weight_bytes.max(LEAST_WEIGHT_BYTES);
         let mut state = self.0.lock();
@@ -135,12 +137,14 @@ impl<T> Drop for Put<T> {
 }
 
 impl<T> Take<T> {
-    /// Tells `stage` of each item that is taken: what only waits in the window is not done.
+    /// Counts each item that is taken as progress of `stage`. Items that only wait in the window
+    /// are not counted.
     pub(super) fn tally(&mut self, stage: Stage, measure: Measure<T>) {
         self.tally = Some((stage, measure));
     }
 
-    /// The next item with its position, waiting for it; `None` after the last one or a failed one.
+    /// Waits for the next item and returns it with its position; `None` after the last item or
+    /// after an error.
     pub(super) fn take(&self) -> Option<(u64, Result<T>)> {
         let taken = self.next();
         if let (Some((stage, measure)), Some((_, Ok(item)))) = (&self.tally, &taken) {
@@ -161,7 +165,8 @@ impl<T> Take<T> {
                 let (item, weight) = state.window.pop_front().flatten().expect("just seen");
                 state.next += 1;
                 state.bytes -= weight;
-                // The next item may already be there: another consumer may have it.
+                // The next item may be in the window already, and another consumer may be waiting
+                // for it.
                 self.edge.room.notify_all();
                 if matches!(state.window.front(), Some(Some(_))) {
                     self.edge.ready.notify_one();
@@ -180,7 +185,7 @@ impl<T> Take<T> {
         }
     }
 
-    /// Takes nothing more: producers stop, what waits is dropped.
+    /// Ends the edge: producers stop, and items in the window are dropped.
     pub(super) fn stop(&self) {
         let mut state = self.edge.lock();
         state.gone = true;

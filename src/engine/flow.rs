@@ -1,5 +1,5 @@
-//! A flow: numbered items on their way through the steps of one pass. Maps run on groups of
-//! threads; folds and sinks run on the caller's thread, in order.
+//! A flow carries numbered items through the steps of one pass. Maps run on groups of threads;
+//! folds and sinks run on the caller's thread, in the order of the items.
 
 use super::cancel::Cancel;
 use super::edge::{Onward, Put, Take, edge};
@@ -9,7 +9,7 @@ use contract::{Error, Fold, Kind, Map, Result, Weigh};
 use std::sync::Arc;
 use std::thread::{Builder, Scope};
 
-/// What all steps of a pass share.
+/// Scope, engine and cancellation that all steps of a pass share.
 pub(super) struct Pass<'scope, 'env: 'scope> {
     pub(super) scope: &'scope Scope<'scope, 'env>,
     pub(super) name: Arc<str>,
@@ -18,14 +18,15 @@ pub(super) struct Pass<'scope, 'env: 'scope> {
     pub(super) cancel: Cancel,
 }
 
-/// Items on their way. Dropping a flow stops everything before it, source included.
+/// Numbered items between two steps of a pass. Dropping a flow stops all steps before it, including
+/// the source.
 pub struct Flow<'scope, 'env: 'scope, T> {
     pass: Pass<'scope, 'env>,
     take: Take<T>,
 }
 
 impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
-    /// Reads `source` on a thread of its own.
+    /// Starts a thread that reads `source`.
     pub(super) fn source<S>(pass: Pass<'scope, 'env>, source: S, stage: Stage) -> Self
     where
         S: Iterator<Item = Result<T>> + Send + 'env,
@@ -45,7 +46,7 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
         Self { pass, take }
     }
 
-    /// Sends each item through `stage` on the engine's workers. Order in is order out.
+    /// Applies `stage` to each item on the engine's worker threads. The order of the items is kept.
     pub fn map<M>(self, stage: &'env M) -> Flow<'scope, 'env, M::Out>
     where
         M: Map<In = T>,
@@ -61,7 +62,7 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
                 .spawn_scoped(self.pass.scope, move || {
                     work(stage, &my_take, &my_put, &name, &cancel)
                 });
-            // Fewer workers than asked for is slower, none is an end.
+            // With fewer workers than asked for the pass is slower; without any it cannot run.
             if let (0, Err(e)) = (i, spawned) {
                 refuse(&put, e);
             }
@@ -69,7 +70,10 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
         Flow { pass: self.pass, take: out }
     }
 
-    /// Folds all items, in order, into one answer.
+    /// Folds all items, in order, into one value.
+    ///
+    /// # Errors
+    /// The first error by position.
     pub fn fold<F: Fold<In = T>>(self, stage: &F) -> Result<F::Out> {
         let name = Arc::clone(&self.pass.name);
         let mut sum = guarded(&name, 0, || Ok(stage.empty()))?;
@@ -77,7 +81,10 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
         guarded(&name, 0, || stage.finish(sum))
     }
 
-    /// Hands each item, in order, to `sink` on the caller's thread.
+    /// Passes each item, in order, to `sink` on the caller's thread.
+    ///
+    /// # Errors
+    /// The first error by position, or that of `sink`.
     pub fn for_each(self, mut sink: impl FnMut(T) -> Result<()>) -> Result<()> {
         let name = Arc::clone(&self.pass.name);
         for (at, item) in self.items().enumerate() {
@@ -87,7 +94,7 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
         Ok(())
     }
 
-    /// All items, in order, up to the first error; for a sink that pulls.
+    /// All items, in order, up to the first error, as an iterator for a sink that pulls.
     pub fn items(self) -> impl Iterator<Item = Result<T>> {
         let mut ended = false;
         std::iter::from_fn(move || {
@@ -101,13 +108,17 @@ impl<'scope, 'env, T: Send + 'env> Flow<'scope, 'env, T> {
         })
     }
 
-    /// All items, in order. Not bounded: only for what is small.
+    /// Collects all items, in order. The memory is not bounded: use it only where the result is
+    /// small.
+    ///
+    /// # Errors
+    /// The first error by position.
     pub fn collect(self) -> Result<Vec<T>> {
         self.items().collect()
     }
 }
 
-/// The source's thread.
+/// Body of the thread that reads the source.
 fn read<T: Weigh>(
     mut source: impl Iterator<Item = Result<T>>,
     put: &Put<T>,
@@ -131,7 +142,7 @@ fn read<T: Weigh>(
     }
 }
 
-/// A worker's thread.
+/// Body of a worker thread of a map.
 fn work<M: Map>(stage: &M, take: &Take<M::In>, put: &Put<M::Out>, name: &str, cancel: &Cancel)
 where
     M::Out: Weigh,
@@ -153,7 +164,7 @@ where
     }
 }
 
-/// Ends a pass whose thread the system would not start.
+/// Ends a pass for which the system could not start a thread.
 fn refuse<T>(put: &Put<T>, cause: std::io::Error) {
     let error = Error::new(Kind::Io, "a thread could not be started").because(cause);
     put.put(0, Err(error), 0);

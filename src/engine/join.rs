@@ -1,5 +1,5 @@
-//! Work beside other work: two closures in, what both came to out. One may hand items to the other,
-//! in order, bounded by bytes.
+//! Two closures that run at the same time, with or without items that one passes to the other in
+//! order and bounded by bytes.
 
 use super::cancel::Cancel;
 use super::edge::{Onward, edge};
@@ -7,17 +7,17 @@ use super::panic_guard::guarded;
 use super::runner::Engine;
 use contract::{Error, Kind, Result, Weigh};
 
-/// Items as they are handed over, up to an error of whom they come from.
+/// Items that one closure receives from the other, up to the first error of the sender.
 pub type PipedItems<'i, T> = &'i mut dyn Iterator<Item = Result<T>>;
-/// Hands an item over; an error where nobody takes any more.
+/// Sends an item to the other closure; returns an error where the receiver has ended.
 pub type PipeSender<'h, T> = &'h mut dyn FnMut(T) -> Result<()>;
 
 impl Engine {
-    /// Does `aside` on a thread of its own while `work` is done on this one; the error of the work
-    /// goes first.
+    /// Runs `aside` on its own thread while `work` runs on the caller's thread. If both fail, the
+    /// error of `work` is returned.
     ///
     /// # Errors
-    /// Those of both; a panic of either is a bug.
+    /// The errors of both closures; a panic in either becomes an error of kind `Bug`.
     pub fn join<T: Send, U>(
         &self,
         name: &str,
@@ -33,12 +33,12 @@ impl Engine {
         })
     }
 
-    /// The same, and `aside` is handed items by `work`: as many wait as a channel holds. Where the
-    /// work fails, so does what comes to `aside`; where `aside` stops taking, its error is the
-    /// one.
+    /// Like [`Engine::join`], and `work` sends items to `aside` through a channel of
+    /// `channel_bytes`. If `work` fails, the receiver gets its error; if `aside` stops receiving,
+    /// its error is returned.
     ///
     /// # Errors
-    /// As of [`Engine::join`].
+    /// Those of [`Engine::join`].
     pub fn pipe<I: Weigh + Send, T: Send, U>(
         &self,
         name: &str,
@@ -52,7 +52,7 @@ impl Engine {
             name,
             move || {
                 let mut items = std::iter::from_fn(|| take.take().map(|(_, item)| item));
-                // Whose error goes first is decided below.
+                // Which of the two errors is returned is decided below.
                 Ok(guarded(name, 0, || {
                     let done = aside(&mut items)?;
                     items.next().transpose()?.map_or(Ok(done), |_| Err(left_over(name)))
@@ -81,7 +81,7 @@ impl Engine {
     }
 }
 
-/// An end before the last item.
+/// The error for a receiver that ended before it had taken all items.
 fn left_over(name: &str) -> Error {
-    Error::new(Kind::Bug, format!("{name} did not take all that it was given"))
+    Error::new(Kind::Bug, format!("{name} ended before it had received all of its items"))
 }

@@ -1,14 +1,16 @@
-//! The laws of the engine for passes drawn at random: lengths, workers, memory, failures, panics.
+//! Property tests of the engine on random passes: their lengths, workers, memory bounds, failures
+//! and panics are drawn.
 
 use super::tests::{Digest, Heavy, Live, Number, Work, engine};
 use contract::{Error, Fold, Kind, Result};
 use proptest::prelude::*;
 use std::sync::Arc;
 
-/// Passes that are drawn for a law: each starts threads, and takes a millisecond.
+/// Number of random passes for each property. Each pass starts threads and takes about a
+/// millisecond.
 const N_CASES: u32 = 96;
 
-/// Items that fail or panic: mostly none, else a few.
+/// Positions of items that fail or panic: mostly none, else a few.
 fn unlucky(n: u64) -> impl Strategy<Value = Vec<u64>> {
     prop::collection::vec(0..n.max(1), 0..4)
 }
@@ -35,7 +37,7 @@ proptest! {
         });
         let digest = Digest;
         let done = engine(n_workers, channel_bytes).pass("work", source, |f| f.map(&work).fold(&digest));
-        // What one thread does, item by item.
+        // The expected result: that of one thread that handles item after item.
         let first = (0..n).find(|i| torn == Some(*i) || panics.contains(i) || fails.contains(i));
         match (done, first) {
             (Ok(found), None) => {
@@ -92,8 +94,8 @@ proptest! {
         prop_assert_eq!(seen, (0..n).collect::<Vec<_>>());
         let (now, peak) = live.both();
         prop_assert_eq!(now, 0);
-        // The channel before the step and the one after it, each over by one item at most; one
-        // item a worker; the one that the source has made and the one that the end holds.
+        // Bound of the memory: two channels, each exceeded by one item at most; one item per
+        // worker; one item held by the source and one by the sink.
         let most = 2 * channel_bytes.max(largest) + (n_workers + 4) * largest;
         prop_assert!(peak <= most as i64, "{} bytes alive, {} allowed", peak, most);
     }

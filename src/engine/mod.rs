@@ -1,14 +1,14 @@
-//! The engine: steps in, threads, order, memory bounds, errors and cancellation around them. Knows
-//! no geometry.
+//! The engine runs the steps of a pass on threads, keeps the order of items, bounds memory, and
+//! handles errors, panics and cancellation. It knows nothing of geometry or files.
 //!
 //! | promise | how |
 //! | --- | --- |
-//! | order in is order out | results wait in a window; the holder of the next one never waits |
-//! | memory is bounded | windows by bytes; an oversized item travels alone; one item a worker besides |
-//! | the answer does not depend on workers or memory | folds run in order on one thread |
-//! | the error reported is the first by position | later items are skipped only once an earlier one has failed |
-//! | a panic in a step ends the run as `Kind::Bug` | caught per item |
-//! | dropping a flow stops its source | the consumer's end tells the producers when it goes, all the way up |
+//! | the order of items is kept | results wait in a window, the next one never waits |
+//! | memory is bounded | windows count bytes; oversized items pass alone; one item per worker |
+//! | results do not depend on workers or memory | folds run in order on one thread |
+//! | the reported error is the first by position | only items after a failed one are skipped |
+//! | a panic in a step ends the run as `Kind::Bug` | panics are caught per item |
+//! | dropping a flow stops its source | a dropped consumer stops its producers, up to the source |
 
 mod amount;
 mod cancel;

@@ -1,5 +1,5 @@
-//! Progress: what stages have done in, bars, lines or JSON on standard error out; and one report a
-//! stage for the result. The only place that owns a clock.
+//! Progress of stages on standard error, as bars, lines or JSON, and one report per stage for the
+//! result. Only this module reads a clock.
 
 mod words;
 
@@ -15,74 +15,75 @@ use words::{StageState, json, words};
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Mode {
-    /// A moving bar, for a terminal.
+    /// A bar that is redrawn, for a terminal.
     Bar,
     /// A line every few seconds and at the end of each stage, for a log.
     Plain,
-    /// The same as JSON, one object a line, for programs.
+    /// One JSON object per line, for programs.
     Json,
     /// Nothing.
     None,
 }
 
 impl Mode {
-    /// What suits standard error: a bar on a terminal, else plain lines.
+    /// The mode that suits standard error: a bar on a terminal, else plain lines.
     #[must_use]
     pub fn fitting() -> Self {
         if std::io::stderr().is_terminal() { Self::Bar } else { Self::Plain }
     }
 }
 
-/// Time between two lines of a stage: a log of an hour stays readable.
+/// Time between two lines of a stage; five seconds keep the log of an hour readable.
 const LINE_EVERY: Duration = Duration::from_secs(5);
-/// Time between two JSON objects of a stage: often enough for a display.
+/// Time between two JSON objects of a stage, short enough for a live display.
 const JSON_EVERY: Duration = Duration::from_secs(1);
-/// Time between two pictures of a bar.
+/// Time between two redraws of a bar.
 const BAR_EVERY: Duration = Duration::from_millis(120);
 
-/// What a stage did, for `result.json`.
+/// Time and amount of work of a finished stage, for `result.json`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageReport {
     /// Name of the stage.
     pub name: String,
     /// Wall-clock time, seconds.
     pub seconds: f64,
-    /// Items that passed.
+    /// Number of items that passed through the stage.
     pub n_items: u64,
-    /// Points that passed.
+    /// Number of points that passed through the stage.
     pub n_points: u64,
-    /// Bytes that passed.
+    /// Number of bytes that passed through the stage.
     pub bytes: u64,
 }
 
-/// Where progress is told; clones share it.
+/// Receives and shows the progress of all stages. Clones share one state.
 #[derive(Clone)]
 pub struct Progress(Arc<Inner>);
 
 struct Inner {
     mode: Mode,
-    /// Lines are objects, for programs.
+    /// Whether lines are written as JSON objects.
     is_json: bool,
     out: Mutex<Box<dyn Write + Send>>,
     reports: Mutex<Vec<StageReport>>,
     bars: indicatif::MultiProgress,
 }
 
-/// A stage at work; clones share it.
+/// A running stage. Clones share one state.
 #[derive(Clone)]
 pub struct Stage(Arc<Running>);
 
-/// Pieces of work within the items of a stage, which become known while an item is worked on: each
-/// may take minutes. Clones share them.
+/// Counter of the pieces of work within the items of a stage. Their number becomes known while an
+/// item is worked on, and each may take minutes. Clones share one state.
 #[derive(Clone, Default)]
 pub struct Pieces(Arc<PieceCounts>);
 
 #[derive(Default)]
 struct PieceCounts {
-    /// Pieces done, and pieces known so far.
+    /// Number of pieces that are done.
     done: AtomicU64,
+    /// Number of pieces that are known so far.
     known: AtomicU64,
-    /// The stage that they are shown with.
+    /// The stage whose progress shows the pieces.
     stage: OnceLock<Weak<Running>>,
 }
 
@@ -91,10 +92,10 @@ struct Running {
     name: String,
     total: Amount,
     start: Instant,
-    /// Time of processors at its start, seconds.
+    /// Processor time of the process when the stage began, seconds.
     start_cpu: f64,
     done: [AtomicU64; 3],
-    /// Milliseconds since `start` at which the next line is due.
+    /// Milliseconds from `start` to the moment at which the next line is due.
     next_line: AtomicU64,
     bar: Option<ProgressBar>,
     finished: Mutex<bool>,
@@ -102,19 +103,19 @@ struct Running {
 }
 
 impl Pieces {
-    /// Says that so many more will have to be done.
+    /// Adds `n` pieces that remain to be done.
     pub fn expect(&self, n: usize) {
         self.0.known.fetch_add(n as u64, Ordering::Relaxed);
         self.show();
     }
 
-    /// Says that one of them is done.
+    /// Counts one piece as done.
     pub fn done(&self) {
         self.0.done.fetch_add(1, Ordering::Relaxed);
         self.show();
     }
 
-    /// Done and known so far.
+    /// Numbers of pieces done and of pieces known so far.
     fn counts(&self) -> [u64; 2] {
         [&self.0.done, &self.0.known].map(|n| n.load(Ordering::Relaxed))
     }
@@ -133,13 +134,13 @@ impl Progress {
         Self::to(mode, Box::new(std::io::stderr()))
     }
 
-    /// Shows nothing, and says the few lines that must be said as JSON.
+    /// Shows no progress, but writes notes, warnings and errors as JSON.
     #[must_use]
     pub fn json_without_progress() -> Self {
         Self::with(Mode::None, true, Box::new(std::io::stderr()))
     }
 
-    /// Shows nothing; reports are kept all the same.
+    /// Shows nothing; reports of stages are kept.
     #[must_use]
     pub fn silent() -> Self {
         Self::new(Mode::None)
@@ -172,7 +173,7 @@ impl Progress {
         self.stage_of(name, total, Pieces::default())
     }
 
-    /// The same, which shows pieces of its items, too.
+    /// Like [`Progress::stage`], for a stage that also shows `pieces` of its items.
     #[must_use]
     pub fn stage_of(&self, name: &str, total: Amount, pieces: Pieces) -> Stage {
         let bar = (self.0.mode == Mode::Bar).then(|| self.bar(name, &total));
@@ -188,18 +189,18 @@ impl Progress {
             finished: Mutex::new(false),
             pieces,
         }));
-        // Pieces belong to the first stage that they are shown with.
+        // Pieces stay with the first stage that shows them.
         stage.0.pieces.0.stage.set(Arc::downgrade(&stage.0)).ok();
         stage
     }
 
-    /// What each finished stage did, in the order of their ends.
+    /// Reports of all finished stages, in the order in which they ended.
     #[must_use]
     pub fn reports(&self) -> Vec<StageReport> {
         self.0.reports.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Says a line on standard error without spoiling a bar.
+    /// Writes a line to standard error without spoiling a bar.
     pub fn say(&self, line: &str) {
         let said = if self.0.is_json {
             let said = serde_json::json!({"level": "info", "message": line}).to_string();
@@ -231,7 +232,7 @@ impl Progress {
         bar
     }
 
-    /// A line that cannot be written is no reason to end a run.
+    /// A line that cannot be written does not end the run.
     fn line(&self, line: &str) {
         let mut out = self.0.out.lock().unwrap_or_else(PoisonError::into_inner);
         let _ = writeln!(out, "{line}");
@@ -239,7 +240,7 @@ impl Progress {
 }
 
 impl Stage {
-    /// Adds what has been done.
+    /// Adds items, points and bytes that were done, and shows a line when one is due.
     pub fn add(&self, items: u64, points: u64, bytes: u64) {
         let run = &self.0;
         for (counter, more) in run.done.iter().zip([items, points, bytes]) {
@@ -254,13 +255,13 @@ impl Stage {
             return;
         }
         let next = (now + run.progress.every()).as_millis() as u64;
-        // Only one thread speaks for this moment.
+        // Only the thread that moves the due time forward writes the line.
         if run.next_line.compare_exchange(due, next, Ordering::Relaxed, Ordering::Relaxed).is_ok() {
             run.show(now.as_secs_f64(), false);
         }
     }
 
-    /// Ends the stage: its report is kept, a last line is shown. A second call does nothing.
+    /// Ends the stage: its report is kept and a last line is shown. Further calls have no effect.
     pub fn finish(&self) {
         self.0.finish();
     }
@@ -318,10 +319,10 @@ impl Running {
     }
 }
 
-/// Time of processors that this process has used so far, seconds; 0 where the system does not tell.
+/// Processor time that this process has used so far, seconds; 0 where the system does not state it.
 fn cpu_seconds() -> f64 {
-    /// Fields of `/proc/self/stat` after the name: time of the program and of the system for it, in
-    /// ticks, of which Linux has a hundred a second for programs.
+    /// Indices of user and system time among the fields of `/proc/self/stat` after the process
+    /// name, in ticks; Linux counts a hundred ticks per second for programs.
     const TIMES: [usize; 2] = [11, 12];
     const TICKS: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
@@ -397,7 +398,7 @@ mod tests {
         assert_eq!((&last["items"], &last["event"]), (&0.into(), &"progress".into()));
         assert_eq!((&last["pieces"], &last["pieces_known"]), (&1.into(), &8.into()));
         drop(stage);
-        // Its stage is gone: nobody is told.
+        // The stage has ended, so nothing is shown.
         pieces.done();
     }
 

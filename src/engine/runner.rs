@@ -1,5 +1,5 @@
-//! Steps in; passes over a source and fan-outs over a list, each with threads, order, memory
-//! bounds, errors and cancellation, out.
+//! The engine itself: passes over a source and fan-outs over a list, with threads, order, memory
+//! bounds, errors and cancellation.
 
 use super::amount::Amount;
 use super::cancel::Cancel;
@@ -11,21 +11,20 @@ use rayon::prelude::*;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Default of [`Engine::channel_bytes`]: a few dozen strips or tiles, far more than it takes to
-/// keep workers busy.
+/// Default of [`Engine::channel_bytes`]: a few dozen strips or tiles, which keeps all workers busy.
 pub const CHANNEL_BYTES: usize = 32 << 20;
 
 /// Runs steps. Threads are started for a pass and joined before it returns.
 pub struct Engine {
-    /// Threads of each map, and of [`Engine::fan_out`].
+    /// Number of threads of each map and of [`Engine::fan_out`].
     pub n_workers: usize,
-    /// What each channel between two steps of a pass may keep, bytes.
+    /// Most bytes that wait in each channel between two steps of a pass.
     pub channel_bytes: usize,
     /// Whether there is memory for one large item at a time only (see [`Task::large`]).
     pub is_narrow: bool,
-    /// Ends the run early.
+    /// Cancellation flag of the run.
     pub cancel: Cancel,
-    /// Told how far the run is.
+    /// Receives the progress of all stages.
     pub progress: Progress,
     pool: OnceLock<rayon::ThreadPool>,
 }
@@ -46,22 +45,22 @@ impl Task {
         Self { name: name.into(), ..Self::default() }
     }
 
-    /// Its items take much memory each, as all that scans see of a region does: where there is
-    /// little, they are done one after the other, each on all threads.
+    /// Marks a task whose items each take much memory, such as all views of a region. On a narrow
+    /// engine they run one after the other, each on all threads.
     #[must_use]
     pub fn large(mut self) -> Self {
         self.is_large = true;
         self
     }
 
-    /// Says that its items have pieces of their own, to be shown beside them.
+    /// Shows `pieces` of the items beside the progress of the task.
     #[must_use]
     pub fn showing(mut self, pieces: &Pieces) -> Self {
         self.pieces = pieces.clone();
         self
     }
 
-    /// Says how much it has to do; zero means not known.
+    /// Sets the total amount of work; zero means not known.
     #[must_use]
     pub fn of(mut self, total: Amount) -> Self {
         self.total = total;
@@ -76,7 +75,7 @@ impl From<&str> for Task {
 }
 
 impl Engine {
-    /// An engine of `n_workers` threads a step (at least one), silent, with default channels.
+    /// An engine with `n_workers` threads per step (at least one), default channels and no output.
     #[must_use]
     pub fn new(n_workers: usize) -> Self {
         Self {
@@ -89,7 +88,7 @@ impl Engine {
         }
     }
 
-    /// One like it, with as little memory, that shows nothing and is cancelled with it.
+    /// An engine with the same threads, memory and cancellation that shows no progress.
     #[must_use]
     pub fn quiet(&self) -> Self {
         Self {
@@ -100,8 +99,8 @@ impl Engine {
         }
     }
 
-    /// One like it, for work that waits for the disk most of its time: with four times the threads,
-    /// since a disk reads and writes several files at once faster than one after the other.
+    /// An engine for work that mostly waits for the disk: it has four times the threads, since a
+    /// disk serves several files at once faster than one after the other.
     #[must_use]
     pub(crate) fn for_disks(&self) -> Self {
         Self {
@@ -144,9 +143,11 @@ impl Engine {
         out
     }
 
-    /// Does `f` to each item on a pool of `n_workers` threads; results in the order of the items,
-    /// the first error by position. `f` may use rayon in its turn, but must not wait for a
-    /// channel.
+    /// Applies `f` to each item on a pool of `n_workers` threads and returns the results in the
+    /// order of the items. `f` may use rayon itself, but must not wait for a channel.
+    ///
+    /// # Errors
+    /// The first error by position.
     pub fn fan_out<T, U>(
         &self,
         task: impl Into<Task>,
@@ -160,7 +161,8 @@ impl Engine {
         let mut task = task.into();
         task.total.items = items.len() as u64;
         let stage = self.progress.stage_of(&task.name, task.total, task.pieces.clone());
-        // Items after a failed one are skipped, since an earlier error decides.
+        // Items after a failed one are skipped, since the error with the lowest position is
+        // returned.
         let failed = AtomicUsize::new(usize::MAX);
         let one = |(at, item): (usize, T)| {
             if at > failed.load(Ordering::SeqCst) {
@@ -182,16 +184,16 @@ impl Engine {
         let threads = PoolThreads { pool: self.pool()?, in_turn: task.is_large && self.is_narrow };
         let all: Vec<Option<Result<U>>> = (&threads as &dyn Fan).fan(items, one);
         stage.finish();
-        // A skipped item stands after an error, and `collect` stops at that.
+        // A skipped item always follows an error, and `collect` stops at that error.
         all.into_iter()
             .map(|out| out.unwrap_or_else(|| Err(Error::new(Kind::Bug, "an item was skipped"))))
             .collect()
     }
 
-    /// The same for small work that is over before anybody asks how far it is.
+    /// Like [`Engine::fan_out`], without progress, for work that takes a moment.
     ///
     /// # Errors
-    /// The first by position.
+    /// The first error by position.
     pub(crate) fn each<T: Send, U: Send>(
         &self,
         items: Vec<T>,
@@ -203,10 +205,10 @@ impl Engine {
         (&threads as &dyn Fan).fan(items, f).into_iter().collect()
     }
 
-    /// Threads for pieces of a step that wait for the disk most of their time.
+    /// A pool of threads for pieces of a step that mostly wait for the disk.
     ///
     /// # Errors
-    /// Threads that the system does not start.
+    /// The system could not start the threads.
     pub(crate) fn disks(&self) -> Result<Threads> {
         let engine = self.for_disks();
         engine.pool()?;
@@ -227,7 +229,7 @@ impl Engine {
     }
 }
 
-/// The pieces of a step on threads of their own.
+/// Runs the pieces of a step on their own threads.
 pub(crate) struct Threads(OnceLock<rayon::ThreadPool>);
 
 impl Fan for Threads {
@@ -239,8 +241,8 @@ impl Fan for Threads {
     }
 }
 
-/// The pieces of a pass on the threads of a pool; where so asked one after the other, each of them
-/// on all threads.
+/// Runs the pieces of a pass on the threads of a pool or, on a narrow engine, one after the other
+/// with all threads for each.
 struct PoolThreads<'p> {
     pool: &'p rayon::ThreadPool,
     in_turn: bool,
@@ -255,17 +257,17 @@ impl Fan for PoolThreads<'_> {
     }
 }
 
-/// The pieces of a step on the threads of the pool that the step runs in.
+/// Runs the pieces of a step on the threads of the pool that the step itself runs in.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct AllThreads;
 
 impl Fan for AllThreads {
-    /// Begun in their order, each by the next free thread: where the largest are first, no thread
-    /// ends long after the others. The only such use of rayon here, since each is compiled anew for
-    /// each closure that it is given.
+    /// Pieces start in their order, each on the next free thread: where the largest come first, no
+    /// thread ends long after the others. This is the only such use of rayon in the crate, since
+    /// rayon is compiled anew for each closure.
     fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync)) {
         let next = AtomicUsize::new(0);
-        // Items are few and large: each may go to whichever thread is free.
+        // Items are few and large, so each is scheduled by itself.
         let pieces = (0..n).into_par_iter().with_max_len(1);
         pieces.for_each(|_| work(next.fetch_add(1, Ordering::Relaxed)));
     }

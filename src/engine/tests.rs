@@ -63,7 +63,7 @@ fn mix(x: u64) -> u64 {
     (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb) >> 11
 }
 
-/// Takes a time that varies from item to item, fails or panics where told.
+/// A map whose time varies from item to item, and that fails or panics at given positions.
 #[derive(Default)]
 pub(super) struct Work {
     pub(super) fails: Vec<u64>,
@@ -365,7 +365,7 @@ fn what_is_handed_over_comes_in_order_and_bounded() {
         )
         .expect("both end");
     assert_eq!((seen, n), ((0..500).collect(), 500));
-    // What the channel holds, one that waits for it and one that is being taken.
+    // Items in the channel, one that waits for it and one that is being taken.
     assert!(
         live.peak.load(Ordering::SeqCst) <= 160,
         "{live_peak}",

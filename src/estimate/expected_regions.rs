@@ -1,6 +1,6 @@
-//! Open inputs in; what seems to stand in the plant, by a glance at some of its points, out: the
-//! regions that a run would search. Floor and voxels are found more simply than a run does;
-//! clusters and regions are made by the same stages.
+//! A preview of the regions that a run would search, from a sample of the points of all inputs.
+//! Floor and voxels are computed more simply than in a run; clusters and regions come from the same
+//! stages.
 
 use crate::engine::{AllThreads, Engine};
 use crate::job::Settings;
@@ -11,36 +11,35 @@ use ingest::{GlanceSample, Sources};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Points of an input of each format that are decoded: about a second of one thread.
+/// Number of points that are decoded of an input, by format: about a second of one thread.
 const DECODED: [(Format, u64); 4] = [
     (Format::E57, 20_000_000),
     (Format::Las, 20_000_000),
     (Format::Laz, 3_000_000),
     (Format::Ptx, 6_000_000),
 ];
-/// Points that are kept of all inputs: a hall of 20 m x 20 m has some twenty in each voxel of its
-/// surfaces then.
+/// Number of sampled points of all inputs: some twenty per surface voxel in a hall of 20 m x 20 m.
 const KEPT: u64 = 3_000_000;
-/// Edge of the columns that a floor's extent is counted in, metres.
+/// Edge of the columns with which the extent of a floor is measured, metres.
 const COLUMN: f64 = 0.25;
-/// Thickness of a layer in which a floor is looked for, metres.
+/// Thickness of the layers among which the floor is searched, metres.
 const LAYER: f64 = 0.05;
-/// Share of the columns of the widest layer that a floor has at least: robots and machines hide
+/// Least share of the columns of the widest layer that a floor covers: robots and machines hide
 /// much of it, and ceilings are as wide.
 const FLOOR_SHARE: f64 = 0.35;
-/// Edge of a cell of the floor's heights, and how far these may lie off the layer, metres: floors
-/// lean.
+/// Edge of a cell of the floor's heights, metres.
 const CELL: f64 = 1.0;
+/// Greatest distance of a cell's height from the layer, metres: floors lean.
 const OFF: f64 = 0.15;
 /// Step of heights within a cell, metres.
 const STEP: f64 = 0.02;
 
-/// What seems to stand in a plant.
+/// Regions that a run would probably search.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ExpectedRegions {
-    /// Regions that would be searched, largest first.
+    /// The regions, largest first.
     pub regions: Vec<ExpectedRegion>,
-    /// Whether a floor was seen; else all heights are tried.
+    /// Whether a floor was found; otherwise a run tries all heights.
     pub has_floor: bool,
 }
 
@@ -49,15 +48,15 @@ pub struct ExpectedRegions {
 pub struct ExpectedRegion {
     /// Its extent along each axis, metres.
     pub size: [f64; 3],
-    /// Points above the floor in it, about.
+    /// Estimated number of points above the floor in it.
     pub n_points: u64,
-    /// Surface above the floor in it: voxels that hold points.
+    /// Number of voxels above the floor that hold points.
     pub n_voxels: usize,
 }
 
-/// Looks at some points of all inputs. An input that is broken where it is looked at gives no
-/// points: the run says what is wrong with it.
-pub(super) fn look(
+/// Samples the points of all inputs. A broken input gives no points: the run reports what is wrong
+/// with it.
+pub(super) fn sample(
     sources: &Sources,
     settings: &Settings,
     engine: &Engine,
@@ -74,21 +73,21 @@ pub(super) fn look(
         };
         let pool = engine.pool()?;
         let glance = pool.install(|| sources.glance(input.id, sample, &AllThreads))?;
-        // So many points does each that was kept stand for.
+        // Number of points of the input that each sampled point represents.
         let each = n as f64 / glance.points.len().max(1) as f64;
         Ok((glance.points, each))
     };
     let seen: Vec<(Vec<[f64; 3]>, f64)> = inputs.iter().map(of_input).collect::<Result<_>>()?;
-    Ok(stand(&seen, settings))
+    Ok(regions_of(&seen, settings))
 }
 
-/// What stands where these points are, each of which stands for so many.
-fn stand(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> ExpectedRegions {
+/// Regions of these points, each of which represents a number of points.
+fn regions_of(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> ExpectedRegions {
     let edge = settings.lattice.voxel;
     let mut voxels: BTreeMap<[i32; 3], f64> = BTreeMap::new();
     for (points, each) in seen {
         for p in points {
-            // By height, then rows: the order of an occupancy.
+            // Sorted by height, then rows: the order of an occupancy.
             let [x, y, z] = p.map(|v| (v / edge).floor() as i32);
             *voxels.entry([z, y, x]).or_default() += each;
         }
@@ -102,7 +101,7 @@ fn stand(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> ExpectedRegions 
     ExpectedRegions { regions, has_floor: !floor.levels.is_empty() }
 }
 
-/// What clusters have in a region.
+/// Size, points and voxels of the clusters in a region.
 fn searched(clusters: &[Cluster], region: &Region) -> ExpectedRegion {
     let world = region.world_bounds();
     let mut out = ExpectedRegion { size: region.bounds.size(), n_points: 0, n_voxels: 0 };
@@ -116,7 +115,7 @@ fn searched(clusters: &[Cluster], region: &Region) -> ExpectedRegion {
     out
 }
 
-/// The lowest wide layer of the points, with its heights; none where no layer is wide.
+/// The lowest wide layer of the points, with its heights; empty where no layer is wide.
 fn floor(seen: &[(Vec<[f64; 3]>, f64)]) -> Floor {
     let all = || seen.iter().flat_map(|(points, _)| points);
     let mut columns: Vec<[i32; 3]> = all()
@@ -156,7 +155,7 @@ fn floor(seen: &[(Vec<[f64; 3]>, f64)]) -> Floor {
     Floor { levels: vec![level], planes: Vec::new() }
 }
 
-/// Least extent of a floor, m².
+/// Least area of a floor, m².
 const MIN_AREA: f64 = 2.0;
 
 #[cfg(test)]
@@ -197,7 +196,7 @@ mod tests {
             }));
         }
         boxes.iter().for_each(|(min, max)| cuboid(*min, *max, &mut points));
-        stand(&[(points, 7.0)], &Settings::default())
+        regions_of(&[(points, 7.0)], &Settings::default())
     }
 
     #[test]
@@ -219,6 +218,6 @@ mod tests {
 
     #[test]
     fn nothing_has_no_floor() {
-        assert_eq!(stand(&[], &Settings::default()), ExpectedRegions::default());
+        assert_eq!(regions_of(&[], &Settings::default()), ExpectedRegions::default());
     }
 }

@@ -1,5 +1,5 @@
-//! A job in; what it will take of memory, disk and time, and what of it is there already, out. Some
-//! points are looked at to tell how much there is to search.
+//! Estimates memory, disk and time of a job, and what an earlier run has left for it. A sample of
+//! the points tells how much there is to search.
 
 mod expected_regions;
 mod rates;
@@ -19,62 +19,63 @@ use std::path::Path;
 
 pub use expected_regions::{ExpectedRegion, ExpectedRegions};
 
-/// Bytes of a point in the store, with its share of catalogue and checksums.
+/// Size of a point in the store, with its share of catalogue and checksums, bytes.
 const STORE_BYTES: u64 = 18;
-/// Bytes of a point's labels: kind, robot, link.
+/// Size of a point's labels (kind, robot, link), bytes.
 const LABEL_BYTES: u64 = 5;
-/// Share of their length that compressed clouds keep.
+/// Ratio of compressed to plain size of clouds.
 const COMPRESSED: f64 = 0.35;
-/// Bytes of a point in a cloud, without and with colour.
+/// Size of a point in a cloud, without and with colour, bytes.
 const CLOUD_BYTES: [u64; 2] = [34, 40];
-/// Bytes of a point that wait on disk while a COPC file is made.
+/// Size of a point in the temporary files of a COPC conversion, bytes.
 const COPC_BYTES: u64 = 40;
-/// Bytes of a point in a text file, about.
+/// Estimated size of a point in a text file, bytes.
 const TEXT_BYTES: u64 = 45;
-/// Pictures, kept models, voxels and lists, bytes for each model of the library: 7 to 11 MB were
-/// measured in halls of none to two robots, and more robots stand in large plants.
+/// Size of pictures, cached models, voxels and lists for each model of the library, bytes: 7 to 11
+/// MB were measured in halls with up to two robots, and large plants have more robots.
 const EXTRA_BYTES: u64 = 16 << 20;
-/// Bytes of a spatial tile beside its points: header, and what of a disk's block is left empty.
+/// Overhead of a spatial tile: header and the unused part of its last disk block, bytes.
 const TILE_BYTES: u64 = 4096;
-/// Memory of the program with an open library, and of each model and each point until the budget is
-/// full, bytes.
+/// Memory of the program with an open library, bytes.
 const PROGRAM_BYTES: u64 = 160 << 20;
+/// Memory of each loaded model, bytes.
 const MODEL_BYTES: u64 = 24 << 20;
+/// Memory of each point until the budget is full, bytes.
 const POINT_BYTES: u64 = 40;
-/// What is kept of each scan while a robot is searched, however little memory there is, bytes: a
-/// billion points of 20 scans took 0.8 GiB under 512 MiB. No more of them than about so many see a
-/// place.
+/// Memory of each scan while a robot is searched, independent of the budget, bytes: a billion
+/// points of 20 scans took 0.8 GiB with 512 MiB allowed.
 const SCAN_BYTES: u64 = 28 << 20;
+/// Most scans that see one place.
 const SCANS: u64 = 24;
 
-/// What a job will take.
+/// Estimated memory, disk and time of a job.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Points of all inputs, as far as they say; else by their length.
+    /// Number of points of all inputs, as they state or else from their length.
     pub n_points: u64,
-    /// Units of the inputs' own coordinates, in words.
+    /// Messages that name the units of the inputs.
     pub units: Vec<String>,
-    /// Models that are tried.
+    /// Number of models that are searched.
     pub n_models: usize,
-    /// Resident memory at most, bytes: not above `--memory`, but where even one region of all
-    /// scans takes more.
+    /// Greatest resident memory, bytes: at most `--memory`, unless a single region of all scans
+    /// takes more.
     pub memory_bytes: u64,
-    /// Disk for the store, bytes, where it is not there already.
+    /// Disk space for the store, bytes; 0 for tiles that exist already.
     pub store_bytes: u64,
-    /// Disk for what is written, bytes. Old results stay until the new ones are whole.
+    /// Disk space for the result, bytes. An old result stays until the new one is complete.
     pub output_bytes: u64,
-    /// Spatial tiles, about, as far as samples of the scans tell, and at most: more end the run
-    /// before it writes any.
+    /// Estimated number of spatial tiles, from samples of the scans, and the limit: a run with more
+    /// ends before it writes any.
     pub tiles: [u64; 2],
-    /// Free where both go, bytes; 0 where the system does not tell.
+    /// Free space on the disk of the output folder, bytes; 0 where the system does not state it.
     pub free_bytes: u64,
-    /// Time, seconds, least and most, where no other program takes the processors' time.
+    /// Least and greatest time, seconds, if no other program uses the processors.
     pub seconds: [f64; 2],
-    /// What seems to stand in the plant, where it was looked at.
-    pub stand: Option<ExpectedRegions>,
-    /// Inputs whose tiles are there, of all.
+    /// Regions that would probably be searched, if points were sampled.
+    pub expected: Option<ExpectedRegions>,
+    /// Number of inputs whose tiles exist already, and of all inputs.
     pub kept_inputs: [usize; 2],
-    /// Whether nothing has changed, and nothing will be done.
+    /// Whether nothing has changed, so that the run has nothing to do.
     pub unchanged: bool,
 }
 
@@ -85,7 +86,7 @@ pub struct Estimate {
 pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
     job.check_places()?;
     let settings = &job.means.settings;
-    // Where no run has been, nothing is there to be used again, and no input need be read to tell.
+    // Without an earlier run there are no pieces to use again, and no input need be digested.
     let earlier = job.out.join("store").is_dir().then(|| Earlier::look(job, engine)).transpose()?;
     let unchanged = earlier.as_ref().is_some_and(|e| e.unchanged);
     let has_tiles = |i: &Input, sources: &Sources| {
@@ -100,7 +101,7 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
     Ok(Estimate { unchanged, ..estimate })
 }
 
-/// Opens what a job reads, and estimates it but for the search.
+/// Opens all inputs of a job and estimates everything but the search.
 fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Estimate, Sources)> {
     let n_models = library::count(&job.robots)?;
     let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
@@ -111,12 +112,12 @@ fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Es
     Ok((Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)), sources))
 }
 
-/// An error of the job; where a disk was full, with what is missing there.
+/// Adds to an error about a full disk how much space is missing.
 pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
     if !error.is_full_disk() {
         return error;
     }
-    // Where there is no room even to look at what is kept, none of it is counted.
+    // Where the disk is too full to examine cached pieces, none of them is counted.
     let estimate =
         estimate(job, engine).or_else(|_| opened(job, |_, _| false).map(|opened| opened.0));
     match estimate.map(|e| e.need().saturating_sub(e.free_bytes)) {
@@ -128,7 +129,7 @@ pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
     }
 }
 
-/// What an earlier run has left.
+/// Pieces that an earlier run has left.
 struct Earlier {
     output: OutputDir,
     digests: Digests,
@@ -144,13 +145,13 @@ impl Earlier {
     }
 
     fn has_tiles(&self, input: &Input, sources: &Sources, settings: &Settings) -> bool {
-        let key = self.digests.tiles(input, &sources.scans, settings);
+        let key = self.digests.tiles_key(input, &sources.scans, settings);
         key.is_some_and(|key| self.output.has_tiles(&key))
     }
 }
 
 impl Estimate {
-    /// Of opened inputs; `has_tiles` says whose tiles are there.
+    /// The estimate for opened inputs; `has_tiles` tells which inputs have tiles already.
     pub(crate) fn of(
         job: &Job,
         sources: &Sources,
@@ -159,7 +160,7 @@ impl Estimate {
     ) -> Self {
         let threads = job.means.n_threads as f64;
         let (mut n, mut n_new, mut n_kept, mut seconds) = (0_u64, 0_u64, 0, 0.0);
-        // What a file states may be a lie of any size.
+        // A file may state any number of points, so sums must not overflow.
         for input in &sources.inputs {
             let own = points(sources, input);
             n = n.saturating_add(own);
@@ -199,30 +200,30 @@ impl Estimate {
             tiles,
             free_bytes: free(&job.out),
             seconds: [(seconds + library::bytes(&job.robots) as f64 / 1e6 * LOAD) / threads; 2],
-            stand: None,
+            expected: None,
             kept_inputs: [n_kept, sources.inputs.len()],
             unchanged: false,
         }
     }
 
-    /// Adds the time of the search, for what seems to stand in the plant.
+    /// Samples the points and adds the time of the search.
     fn look(&mut self, job: &Job, sources: &Sources, engine: &Engine) -> Result<()> {
-        let stand = expected_regions::look(sources, &job.means.settings, engine)?;
-        let search = search_time::seconds(&stand, self.n_models) / job.means.n_threads as f64;
+        let expected = expected_regions::sample(sources, &job.means.settings, engine)?;
+        let search = search_time::seconds(&expected, self.n_models) / job.means.n_threads as f64;
         self.seconds = [self.seconds[0] + search / SPREAD, self.seconds[1] + search * SPREAD];
-        self.stand = Some(stand);
+        self.expected = Some(expected);
         Ok(())
     }
 
-    /// Disk that it takes, bytes.
+    /// Disk space that the job takes, bytes.
     fn need(&self) -> u64 {
         self.store_bytes.saturating_add(self.output_bytes)
     }
 
-    /// Refuses what the disk cannot hold, and more spatial tiles than there may be.
+    /// Refuses a job that exceeds the free disk space or the limit of spatial tiles.
     ///
     /// # Errors
-    /// More is needed than is free or allowed.
+    /// More disk space or tiles are needed than are free or allowed.
     pub fn checked(&self, out: &Path) -> Result<()> {
         spatial_tiles::within(self.tiles)?;
         let need = self.need();
@@ -259,23 +260,23 @@ impl std::fmt::Display for Estimate {
         )?;
         writeln!(f, "tiles     about {} spatial tiles, at most {}", self.tiles[0], self.tiles[1])?;
         writeln!(f, "time      {:.0} to {:.0} s", self.seconds[0], self.seconds[1])?;
-        if let Some(stand) = &self.stand {
-            let regions = count(stand.regions.len() as u64, "region");
-            let area: f64 = stand.regions.iter().map(|r| r.size[0] * r.size[1]).sum();
+        if let Some(expected) = &self.expected {
+            let regions = count(expected.regions.len() as u64, "region");
+            let area: f64 = expected.regions.iter().map(|r| r.size[0] * r.size[1]).sum();
             writeln!(f, "search    {regions} of {area:.0} m² in all, as far as a glance tells")?;
         }
         write!(f, "kept      tiles of {kept} of {inputs}")
     }
 }
 
-/// Points of an input: what it states, else what its length allows.
+/// Number of points of an input: as it states, else from its length.
 fn points(sources: &Sources, input: &Input) -> u64 {
     let scans = sources.scans.iter().filter(|s| s.input == input.id);
     let in_scans: Option<u64> = scans.map(|s| s.stated_points).sum();
     sources.n_stated(input.id).or(in_scans).unwrap_or(input.n_bytes / TEXT_BYTES)
 }
 
-/// Bytes that are free where a folder lies, or will.
+/// Free space on the disk of a folder that exists or will be created, bytes.
 fn free(folder: &Path) -> u64 {
     let there = folder.ancestors().find(|path| path.is_dir()).unwrap_or(Path::new("."));
     fs4::available_space(there).unwrap_or(0)

@@ -1,28 +1,26 @@
-//! The rates that times are predicted with: processor time, shared among all threads. `bench plan`
-//! draws halls and does them, `scripts/plan_rates.py` measures these rates anew from its rows;
-//! benches/README.md says on which machine and how well they hold.
+//! The rates with which times are predicted: processor seconds, shared by all threads. `bench plan`
+//! scans and processes halls, and `scripts/plan_rates.py` computes these rates from its rows;
+//! benches/README.md states machine and accuracy.
 
 use contract::Format;
 
-/// Points of a format that one thread reads in a second.
+/// Points per second that one thread reads, by format.
 pub(super) const INGEST: [(Format, f64); 4] =
     [(Format::E57, 20e6), (Format::Las, 18e6), (Format::Laz, 2.8e6), (Format::Ptx, 6e6)];
-/// Points that one thread gets through in a second: into tiles, planes, labels near robots,
-/// labelling and writing of all.
+/// Points per second of one thread in four parts of a run: writing lattice tiles, planes, labels
+/// near robots, and labelling and writing all points.
 pub(super) const REST: [f64; 4] = [30e6, 8e6, 60e6, 9e6];
-/// Points that one thread makes a COPC file of in a second.
+/// Points per second of one thread in the COPC conversion.
 pub(super) const COPC: f64 = 0.9e6;
-/// Seconds of one thread to load a megabyte of a model's folder: its meshes are read, joined, and
-/// sampled.
+/// Seconds of one thread per megabyte of a model's folder, for reading, joining and sampling its
+/// meshes.
 pub(super) const LOAD: f64 = 0.38;
-/// Processor seconds of the search of a region, whatever stands there and whatever the models: what
-/// its scans see of it.
+/// Processor seconds per region for its views, independent of models and contents.
 pub(super) const REGION: f64 = 0.6;
-/// Processor seconds of the search for a model over a square metre of regions: bases are tried all
-/// over them, the best are fitted.
+/// Processor seconds per model and square metre of regions, for base search and fits.
 pub(super) const AREA: f64 = 0.10;
-/// Processor seconds of the search for each thousand voxels of 5 cm that hold points above the
-/// floor: views and fits have more points to look at.
+/// Processor seconds per thousand voxels (5 cm) with points above the floor, for views and fits of
+/// more points.
 pub(super) const SURFACE: f64 = 0.29;
-/// By so much a search may take more or less than is predicted.
+/// Factor by which the time of a search may exceed or fall below the prediction.
 pub(super) const SPREAD: f64 = 1.5;

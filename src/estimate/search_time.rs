@@ -1,15 +1,15 @@
-//! What seems to stand in a plant and the number of models in; processor time of the search out.
+//! Predicts the processor time of the search from the expected regions and the number of models.
 
 use super::expected_regions::{ExpectedRegion, ExpectedRegions};
 use super::rates::{AREA, REGION, SURFACE};
 
 /// Processor time of the search, seconds.
-pub(super) fn seconds(stand: &ExpectedRegions, n_models: usize) -> f64 {
+pub(super) fn seconds(expected: &ExpectedRegions, n_models: usize) -> f64 {
     let of_region = |r: &ExpectedRegion| {
         let (area, surface) = (r.size[0] * r.size[1], r.n_voxels as f64 / 1000.0);
         REGION + AREA * area * n_models as f64 + SURFACE * surface
     };
-    stand.regions.iter().map(of_region).sum()
+    expected.regions.iter().map(of_region).sum()
 }
 
 #[cfg(test)]

@@ -1,5 +1,4 @@
-//! A result and the truth of its scene in; how far they agree, robot by robot and point by point,
-//! out.
+//! Compares a result with the truth of its scene, robot by robot and point by point.
 
 use super::confusion::Confusion;
 use contract::words::{Unit, count};
@@ -12,59 +11,58 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A found robot farther than this from a true one is not it, metres.
+/// Distance of bases beyond which a found robot is not the true one, metres.
 const SAME_PLACE: f64 = 0.5;
-/// A posture is found if no joint that is said to be determined is farther off, radians (1°) or
-/// metres.
+/// Greatest error of a determined joint for a posture to count as found, radians (1°) or metres.
 const SAME_POSTURE: f64 = 0.0175;
 
-/// How far a result agrees with the truth.
+/// Agreement of a result with the truth.
 #[derive(Debug, Clone)]
 pub struct Agreement {
     /// One for each true robot, in the order of the truth.
     pub robots: Vec<RobotAgreement>,
-    /// Found robots that no true one explains.
+    /// Found robots that correspond to no true one.
     pub n_invented: usize,
-    /// Its points, by what they are and what they are said to be.
+    /// Counts of points by true and assigned label.
     pub points: Confusion,
-    /// For each thing of the scene: its points, and those of them that are said to move. Empty
-    /// where the truth does not name things.
+    /// For each object of the scene, the number of its points and of those labelled as moving;
+    /// empty where the truth names no objects.
     pub by_object: Vec<[u64; 2]>,
-    /// Names of the things.
+    /// Names of the objects.
     pub objects: Vec<String>,
 }
 
-/// One robot.
+/// Comparison of one true robot.
 #[derive(Debug, Clone)]
 pub struct RobotAgreement {
     /// Name in the scene.
     pub name: String,
     /// True model.
     pub model: String,
-    /// Postures that it stood in while it was scanned.
+    /// Number of postures in which it was scanned.
     pub n_postures: usize,
-    /// What was found at its place.
+    /// The robot that was found at its place.
     pub found: Option<FoundRobot>,
 }
 
-/// What was found at a true robot's place.
+/// A robot that was found at a true robot's place.
 #[derive(Debug, Clone)]
 pub struct FoundRobot {
-    /// Its model, which may be the wrong one.
+    /// Its model, right or wrong.
     pub model: String,
-    /// Whether the true model is among those that it is said to be.
+    /// Whether the true model is among the models that it may be.
     pub is_right: bool,
     /// Its verdict.
     pub verdict: String,
-    /// Postures that were found.
+    /// Number of true postures that were found.
     pub n_postures: usize,
     /// Error of the base: metres, radians.
     pub base: [f64; 2],
-    /// One for each joint that both name.
+    /// Errors of the joints that both name.
     pub joints: Vec<JointError>,
 }
 
-/// How far a joint's value is off.
+/// Error of a joint.
 #[derive(Debug, Clone)]
 pub struct JointError {
     /// Its name.
@@ -73,14 +71,14 @@ pub struct JointError {
     pub error: f64,
     /// Stated standard deviation, same unit.
     pub sigma: f64,
-    /// How well the points are said to tell it.
+    /// Certainty that the result states.
     pub certainty: Certainty,
     /// Whether it slides: its values are metres.
     pub slides: bool,
 }
 
 impl JointError {
-    /// Whether it is said to be determined.
+    /// Whether the result states that it is determined.
     fn is_determined(&self) -> bool {
         self.certainty == Certainty::Determined
     }
@@ -103,9 +101,8 @@ impl Agreement {
         Self::of_session(out, truth_dir, 0)
     }
 
-    /// The same for a result that goes on from another, by the masks of its own scans, from the
-    /// mask `first` on. Uncertain points of theirs lie outside of the cell, and are passed
-    /// over.
+    /// Like the comparison above, for a rescan's result, by the masks of its own scans from the
+    /// mask `first` on. Their uncertain points lie outside of the cell and are ignored.
     pub fn of_session(out: &Path, truth_dir: &Path, first: usize) -> Result<Self> {
         let truth = Truth::from_json(&read_text(&truth_dir.join("truth.json"))?)?;
         let result: ResultFile = serde_json::from_str(&read_text(&out.join("result.json"))?)
@@ -335,7 +332,7 @@ impl Triple {
     }
 }
 
-/// The bytes of a one-dimensional `.npy` of ours, behind its header.
+/// The data of a one-dimensional `.npy` file of this program, after its header.
 fn npy(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = std::fs::read(path).map_err(|e| Error::from(e).at(path.display()))?;
     if bytes.len() < 10 || &bytes[..6] != b"\x93NUMPY" {

@@ -1,28 +1,28 @@
-//! Points in, each with what it is and what it is said to be; how many of each kind are told
-//! rightly out.
+//! Counts of points by true and assigned label, and scores computed from them.
 
 use contract::{Label, PointKind};
 use std::fmt::Write as _;
 
-/// Counts of points by what they are and what they are said to be.
+/// Counts of points by true and assigned label.
 #[derive(Debug, Clone, Default)]
 pub struct Confusion {
-    /// Moving and said to be, moving and not said to be, not moving but said to be, the rest.
+    /// Moving points labelled as moving, moving points labelled otherwise, other points labelled as
+    /// moving, and the rest.
     pub moving: [u64; 4],
     /// Of links: with the right robot and link, all that are true links, all that are said to be
     /// links.
     pub links: [u64; 3],
-    /// That truly stand still, and those of them that are lost to moving.
+    /// Truly fixed points, and those of them labelled as moving.
     pub fixed: [u64; 2],
     /// For each true robot, for each of its links: points with the right robot and link, true
     /// ones, and said ones.
     pub by_link: Vec<Vec<[u64; 3]>>,
-    /// Of attachments: said to be moving (attachment or link), and all.
+    /// Attached points: those labelled as moving (attachment or link), and all.
     pub attached: [u64; 2],
 }
 
 impl Confusion {
-    /// Nothing counted yet, of robots with so many links.
+    /// Empty counts for robots with so many links.
     pub fn new(n_links: impl Iterator<Item = usize>) -> Self {
         Self { by_link: n_links.map(|n| vec![[0; 3]; n]).collect(), ..Self::default() }
     }
@@ -74,7 +74,7 @@ impl Confusion {
         links.map(|c| c[0] as f64 / (c[1] + c[2] - c[0]).max(1) as f64)
     }
 
-    /// Balance of precision and recall of "moves", 0..1.
+    /// F1 score of "moves", 0 to 1.
     #[must_use]
     pub fn f1(&self) -> f64 {
         let [hit, missed, invented, _] = self.moving.map(|n| n as f64);

@@ -1,5 +1,5 @@
-//! A virtual cell: robots of our own built, the cell scanned, the main job run on the scans, the
-//! result compared with the truth.
+//! The demo: builds the demo's robots, scans a virtual cell, runs the main job and compares the
+//! result with the truth.
 
 use super::compare::Agreement;
 use super::virtual_scan::{Formats, scan_scene};

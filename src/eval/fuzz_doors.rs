@@ -1,5 +1,5 @@
-//! Doors for the fuzz targets in `tests/fuzz`, compiled for them only: bytes of files that this
-//! program alone writes, in; whether they were believed, out.
+//! Access for the fuzz targets in `tests/fuzz`, compiled for them only: decodes files that only
+//! this program writes.
 
 use crate::cache;
 use crate::result::plant_probe;

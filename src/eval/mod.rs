@@ -1,5 +1,5 @@
-//! What the program is worth: benches, the demo, the virtual scanner and the comparison of a result
-//! with the truth of its scene. Only the command line imports this room.
+//! Evaluation of the program: benches, the demo, the virtual scanner, and the comparison of results
+//! with the truth. Only the command line imports this room.
 
 pub mod bench;
 pub mod compare;

@@ -1,5 +1,4 @@
-//! The virtual scanner at work: a scene and robot models in; scans, scanner poses and their truth
-//! as files out.
+//! Runs the virtual scanner: writes scans, scanner poses and truth of a scene as files.
 //!
 //! ```text
 //! OUT/scans.e57            all scans with poses, rows and columns; beams without return are flagged as invalid
@@ -149,7 +148,7 @@ impl Files {
     }
 }
 
-/// What is true of the points of one scan.
+/// Truth of the points of one scan.
 struct ScanTruth {
     mask: MaskWriter,
     objects: NpyWriter<u16>,
@@ -211,7 +210,7 @@ fn write_las(
     })
 }
 
-/// Some columns to be cast.
+/// Columns of beams before they are cast.
 struct Columns {
     range: Range<u32>,
     n_rows: u32,
@@ -227,7 +226,7 @@ impl Weigh for Columns {
     }
 }
 
-/// The same, cast.
+/// Columns of beams after they are cast.
 struct SimulatedColumns(SimColumns);
 
 impl Weigh for SimulatedColumns {

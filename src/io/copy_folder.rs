@@ -1,12 +1,12 @@
-//! A folder in; the same folder with all that is in it somewhere else out.
+//! Copies of folders with all files in them.
 
 use contract::{Error, Kind, Result};
 use std::path::Path;
 
-/// Ending of a folder that is not yet whole.
+/// Suffix of a folder whose copy is not complete yet.
 const PART: &str = ".part";
 
-/// Copies a folder with all that is in it.
+/// Copies the folder `from` with all of its files to `to`.
 ///
 /// # Errors
 /// A file that cannot be read or written.
@@ -28,12 +28,11 @@ pub(crate) fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies a folder to a place where nothing is, outside of it, and changes the copy before it takes
-/// its name.
+/// Copies the folder `from` to `to`, which must not exist and must lie outside of `from`. `change`
+/// is applied to the copy before it gets its final name.
 ///
 /// # Errors
-/// Something is there already, the place lies in the folder itself, or what [`copy`] and the change
-/// say.
+/// `to` exists, `to` lies in `from`, or [`copy`] or `change` fails.
 pub(crate) fn copy_as_new(
     from: &Path,
     to: &Path,
@@ -41,16 +40,19 @@ pub(crate) fn copy_as_new(
 ) -> Result<()> {
     let usage = |what: &str| Error::new(Kind::Usage, what).at(to.display());
     if to.symlink_metadata().is_ok() {
-        return Err(usage("the folder is there already").hint("name one that is not"));
+        return Err(
+            usage("the folder exists already").hint("name a folder that does not exist yet")
+        );
     }
-    let name = to.file_name().ok_or_else(|| usage("not the name of a folder"))?;
+    let name = to.file_name().ok_or_else(|| usage("this path has no folder name at its end"))?;
     let parent = to.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let at = |path: &Path, e: std::io::Error| Error::from(e).at(path.display());
-    // What is in a folder that is copied would be copied again and again.
+    // A copy inside of its source would be copied again and again.
     let source = from.canonicalize().map_err(|e| at(from, e))?;
     let above = parent.ancestors().find_map(|p| p.canonicalize().ok());
     if above.is_some_and(|above| above.starts_with(&source)) {
-        return Err(usage("the folder lies in the one that is copied").hint("name one outside"));
+        return Err(usage("the folder lies in the folder that is to be copied")
+            .hint("name a folder outside of it"));
     }
     let mut part = name.to_os_string();
     part.push(PART);

@@ -1,5 +1,5 @@
-//! A file in, pieces of it out, past the system's cache where that is asked for and can be: what is
-//! read once, and is larger than any cache, would only push out of it what is read again.
+//! Reads pieces of a file, past the page cache of the system where that is wanted and possible. A
+//! file that is read once and exceeds any cache would only evict pages that are needed again.
 
 use export::block::{AlignedBlock, PAGE, read_all, set_direct};
 use std::fs::File;
@@ -7,14 +7,15 @@ use std::io::Result;
 use std::ops::{Deref, Range};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A file that many threads read, each piece of it once.
+/// A file whose pieces are read by many threads, each piece once.
 pub(crate) struct DirectFile {
     file: File,
-    /// Memory that no reader uses now: fresh memory costs as much as reading.
+    /// Blocks of memory that no reader uses at present. They are kept, since fresh memory costs as
+    /// much time as reading.
     free: Mutex<Vec<AlignedBlock>>,
 }
 
-/// Bytes of a file in memory that is lent.
+/// Bytes of a file in a block of memory that returns to the file's pool when it is dropped.
 pub(crate) struct LentBytes<'a> {
     of: &'a DirectFile,
     block: AlignedBlock,
@@ -22,18 +23,18 @@ pub(crate) struct LentBytes<'a> {
 }
 
 impl DirectFile {
-    /// Of an open file; past the cache where that can be.
+    /// For an open file, read past the page cache where the system can do that.
     pub(crate) fn past_cache(file: File) -> Self {
         let _ = set_direct(&file, true);
         Self::through_cache(file)
     }
 
-    /// Of an open file that will be read again.
+    /// For an open file that will be read again, read through the page cache.
     pub(crate) fn through_cache(file: File) -> Self {
         Self { file, free: Mutex::default() }
     }
 
-    /// `n` bytes from `start` on, or as many as there are.
+    /// Reads `n` bytes from offset `start` on, or fewer at the end of the file.
     pub(crate) fn read(&self, start: u64, n: usize) -> Result<LentBytes<'_>> {
         let mut block = self.free().pop().unwrap_or_default();
         let before = (start % PAGE as u64) as usize;

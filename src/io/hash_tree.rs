@@ -1,6 +1,6 @@
-//! Pieces of a file in, by whatever thread has them; the BLAKE3 digest of the whole out, as if it
-//! had been read from its beginning to its end. (BLAKE3 paper, 2.1: chunks of 1 KiB are the leaves
-//! of a binary tree, each left half as large as can be.)
+//! The BLAKE3 digest of a file from pieces that any threads have summed up, equal to the digest of
+//! the file read from beginning to end. (BLAKE3 paper, section 2.1: chunks of 1 KiB are the leaves
+//! of a binary tree whose left subtrees are as large as possible.)
 
 use blake3::hazmat::{
     ChainingValue, HasherExt, Mode, left_subtree_len, merge_subtrees_non_root, merge_subtrees_root,
@@ -9,10 +9,11 @@ use blake3::{CHUNK_LEN, Hasher};
 use contract::Weigh;
 use std::ops::Range;
 
-/// Length of a leaf.
+/// Length of a leaf of the tree, bytes.
 const LEAF: u64 = CHUNK_LEN as u64;
 
-/// A part of the tree: so many bytes from a place of the file on, and what they come to.
+/// A subtree of consecutive leaves: its offset and length in the file, bytes, and its chaining
+/// value.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Subtree {
     start: u64,
@@ -20,11 +21,12 @@ pub(crate) struct Subtree {
     value: ChainingValue,
 }
 
-/// The tree of a file of known length; parts join as they come, in order.
+/// The hash tree of a file of known length. Subtrees are added in the order of the file and merged
+/// as they come.
 #[derive(Debug)]
 pub(crate) struct HashTree {
     n_bytes: u64,
-    /// What is not joined yet, one behind the other.
+    /// Subtrees that are not merged yet, in the order of the file.
     parts: Vec<Subtree>,
 }
 
@@ -38,14 +40,15 @@ impl HashTree {
         self.n_bytes
     }
 
-    /// The leaves that begin in a piece of the file, which are its to sum up: the last of them goes
-    /// on into the next piece.
-    pub(crate) fn own(piece: &Range<u64>, n_bytes: u64) -> Range<u64> {
+    /// The byte range of the leaves that begin within `piece`. The last of them may reach into the
+    /// next piece.
+    pub(crate) fn leaves_of(piece: &Range<u64>, n_bytes: u64) -> Range<u64> {
         let leaf = |at: u64| at.next_multiple_of(LEAF).min(n_bytes);
         leaf(piece.start)..leaf(piece.end)
     }
 
-    /// The parts of consecutive leaves of a file, from the place `start` on.
+    /// The subtrees of consecutive leaves in `bytes`, which begin at offset `start` of a file of
+    /// `n_bytes` bytes.
     pub(crate) fn parts(start: u64, bytes: &[u8], n_bytes: u64) -> Vec<Subtree> {
         if n_bytes <= LEAF {
             let value = *blake3::hash(bytes).as_bytes();
@@ -55,8 +58,8 @@ impl HashTree {
         let (mut at, mut left) = (start, bytes);
         while !left.is_empty() {
             let whole = if at == 0 { left_subtree_len(n_bytes) } else { 1 << at.trailing_zeros() };
-            // The largest subtree that begins here and ends in these bytes; the last leaf of a file
-            // may be short.
+            // The largest subtree that begins here and ends within these bytes; only the last leaf
+            // of a file may be short.
             let fits = (left.len() as u64 / LEAF).checked_ilog2().map_or(LEAF, |log| LEAF << log);
             let (own, next) = left.split_at(whole.min(fits).min(left.len() as u64) as usize);
             let value = Hasher::new().set_input_offset(at).update(own).finalize_non_root();
@@ -66,14 +69,14 @@ impl HashTree {
         parts
     }
 
-    /// Adds the parts that come next in the file.
+    /// Adds the subtrees that follow in the file.
     pub(crate) fn add(&mut self, parts: Vec<Subtree>) {
         for part in parts {
             self.parts.push(part);
             while let [.., left, right] = &*self.parts {
                 let n_bytes = left.n_bytes + right.n_bytes;
                 let is_tree = left.n_bytes == right.n_bytes && left.start % n_bytes == 0;
-                // The root is joined otherwise.
+                // The root has its own finalisation and is merged in `finish`.
                 if !is_tree || n_bytes == self.n_bytes {
                     break;
                 }
@@ -82,7 +85,7 @@ impl HashTree {
         }
     }
 
-    /// Joins the last two parts.
+    /// Merges the last two subtrees.
     fn join(&mut self, n_bytes: u64) {
         if let (Some(right), Some(left)) = (self.parts.pop(), self.parts.pop()) {
             let value = merge_subtrees_non_root(&left.value, &right.value, Mode::Hash);
@@ -90,7 +93,7 @@ impl HashTree {
         }
     }
 
-    /// The digest, once all parts came; nothing where some did not.
+    /// The digest of the whole file; `None` where subtrees are missing.
     pub(crate) fn finish(mut self) -> Option<blake3::Hash> {
         if self.parts.iter().map(|p| p.n_bytes).sum::<u64>() != self.n_bytes {
             return None;
@@ -128,7 +131,7 @@ mod tests {
             cuts.sort_unstable();
             let mut tree = HashTree::new(n as u64);
             for pair in cuts.windows(2) {
-                let own = HashTree::own(&(pair[0] as u64..pair[1] as u64), n as u64);
+                let own = HashTree::leaves_of(&(pair[0] as u64..pair[1] as u64), n as u64);
                 let of = &bytes[own.start as usize..own.end as usize];
                 tree.add(HashTree::parts(own.start, of, n as u64));
             }
@@ -148,7 +151,7 @@ mod tests {
                 let mut tree = HashTree::new(n as u64);
                 for start in (0..n).step_by(step) {
                     let piece = start as u64..(start + step).min(n) as u64;
-                    let own = HashTree::own(&piece, n as u64);
+                    let own = HashTree::leaves_of(&piece, n as u64);
                     let of = &bytes[own.start as usize..own.end as usize];
                     tree.add(HashTree::parts(own.start, of, n as u64));
                 }

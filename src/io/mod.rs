@@ -1,5 +1,5 @@
-//! Files in and out: reads past the system's cache, pieces of inputs read by several threads and
-//! summed up, copies of folders, paths that lie inside a result.
+//! Reading and copying of files: reads past the page cache, pieces of inputs that several threads
+//! read, decode and digest, copies of folders, and checks of paths inside a result.
 
 pub(crate) mod copy_folder;
 pub(crate) mod direct;

@@ -1,35 +1,35 @@
-//! A folder and the name of a file in it in; its path out, if the name is one that a result has and
-//! no link leads elsewhere.
+//! Checks that a name from a list of files denotes a file inside a result folder, and that no
+//! symbolic link leads elsewhere.
 //!
-//! Lists of files come from disk, and what they name is read, moved and removed: a name that leads
-//! out of the folder, by dots, as an absolute path or through a link, would read, move and remove
-//! the files of somebody else.
+//! Lists of files are read from disk, and the files that they name are read, moved and removed. A
+//! name with `..`, an absolute path or a symbolic link could otherwise reach files outside of the
+//! result.
 
 use contract::{Error, Result};
 use std::path::{Component, Path, PathBuf};
 
-/// Folders of a result that its list names files in.
+/// Folders of a result whose files its list may name.
 pub(crate) const FOLDERS: [&str; 5] = ["tiles", "clouds", "labels", "robots", "pictures"];
-/// Files beside them.
+/// Files of a result outside of those folders.
 pub(crate) const FILES: [&str; 4] = ["result.json", "plant.bin", "changes.json", "changes.csv"];
 
-/// Whether a name is one that a result gives a file: relative, without dots, and in one of a
-/// result's own folders.
+/// Whether `name` can be a file of a result: relative, without dots, and either one of [`FILES`] or
+/// inside one of [`FOLDERS`].
 pub(crate) fn is_own(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let (first, rest) = (parts.next(), parts.clone().count());
     let Some(Component::Normal(first)) = first else { return false };
     let is_plain = parts.all(|part| matches!(part, Component::Normal(_)));
     let names: &[&str] = if rest == 0 { &FILES } else { &FOLDERS };
-    // A trailing slash or a double one is no name that is written.
+    // Stillpoint writes no name with a trailing or double slash.
     is_plain && names.iter().any(|n| first == *n) && !name.ends_with('/') && !name.contains("//")
 }
 
-/// The path of a file, of which neither itself nor a folder on the way is a link; it need not be
-/// there.
+/// The path of the file `name` in `folder`, after a check that neither the file nor a folder on the
+/// way is a symbolic link. The file need not exist.
 ///
 /// # Errors
-/// A link, with its path.
+/// A symbolic link, named by its path.
 pub(crate) fn without_links(folder: &Path, name: &str) -> Result<PathBuf> {
     let mut path = folder.to_path_buf();
     for part in Path::new(name).components() {
@@ -39,10 +39,10 @@ pub(crate) fn without_links(folder: &Path, name: &str) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Refuses a path that is a link.
+/// Refuses a path that is a symbolic link.
 ///
 /// # Errors
-/// It is one.
+/// The path is a symbolic link.
 pub(crate) fn refuse_link(path: &Path) -> Result<()> {
     if path.symlink_metadata().is_ok_and(|meta| meta.is_symlink()) {
         return Err(Error::bad_input("this is a link, and links are not followed within a result")

@@ -1,5 +1,5 @@
-//! An input in, what a step makes of its strips out, in the order of the file: some threads read
-//! pieces of it, and sum them up where nobody knows its digest; others make points of them.
+//! Reads an input and applies a step to its strips, in the order of the file. Some threads read
+//! pieces of the file and digest them where the digest is not known; others decode the points.
 
 use super::direct::{DirectFile, LentBytes};
 use super::hash_tree::{HashTree, Subtree};
@@ -7,11 +7,11 @@ use crate::engine::{Amount, Engine, Task};
 use contract::{Error, Input, Kind, Map, Result, Strip, Weigh};
 use ingest::{Extent, InputPiece, Sources, Want};
 
-/// Inputs that are larger than this in all are read past the system's cache, bytes: smaller ones it
-/// may still hold when they are read once more, and a disk or share may be slow.
+/// Total size above which inputs are read past the page cache, bytes. Smaller inputs may still be
+/// cached when they are read again, which saves a slow disk or network share.
 const CACHED: u64 = 1 << 30;
 
-/// How an input is read.
+/// An input with the engine and settings that it is read with.
 #[derive(Clone, Copy)]
 pub(crate) struct InputReader<'a> {
     pub(crate) sources: &'a Sources,
@@ -20,15 +20,15 @@ pub(crate) struct InputReader<'a> {
 }
 
 impl InputReader<'_> {
-    /// Points that the input states, for progress; 0 where it states none.
+    /// Number of points that the input states, for progress; 0 where it states none.
     pub(crate) fn amount(&self) -> Amount {
         let own = self.sources.masks.iter().filter(|m| m.input == self.input.id);
         let stated = own.map(|m| m.n_points.unwrap_or(0));
         Amount { items: 0, points: stated.sum(), bytes: 0 }
     }
 
-    /// Does `step` to each strip; hands what it makes of them to `sink`, in order. Digests the file
-    /// up on the way where `tree` wants it and it is read in pieces.
+    /// Applies `step` to each strip and passes the results to `sink`, in the order of the file.
+    /// Where `tree` is given and the input is read in pieces, the file is digested on the way.
     pub(crate) fn each<M: Map<In = Strip>>(
         &self,
         task: Task,
@@ -55,7 +55,8 @@ impl InputReader<'_> {
         })
     }
 
-    /// The file, where it is read in pieces: the one that was opened, whatever has its name by now.
+    /// The file to read pieces from: the one that was opened, even if another file has its name by
+    /// now. `None` where the input is not read in pieces.
     fn file(&self) -> Result<Option<DirectFile>> {
         let Some(file) = self.sources.file(self.input.id) else { return Ok(None) };
         let file = file.try_clone().map_err(|e| Error::from(e).at(self.input.path.display()))?;
@@ -69,7 +70,7 @@ impl InputReader<'_> {
     }
 }
 
-/// Several items as one.
+/// Several items that travel through a pass as one.
 pub(crate) struct Many<T>(Vec<T>);
 
 impl<T: Weigh> Weigh for Many<T> {
@@ -82,19 +83,19 @@ impl<T: Weigh> Weigh for Many<T> {
     }
 }
 
-/// Reads the bytes of pieces.
+/// The map that reads the bytes of pieces.
 struct Load<'a> {
     input: &'a Input,
     file: Option<&'a DirectFile>,
-    /// Length of the file, where it is to be summed up.
+    /// Length of the file, bytes, where it is to be digested.
     n_bytes: Option<u64>,
 }
 
-/// A piece whose bytes are there.
+/// A piece of an input whose bytes have been read.
 enum Loaded<'a> {
     Strip(Strip),
     Extent(Extent, LentBytes<'a>, Vec<Subtree>),
-    /// Bytes without points that nobody asked for.
+    /// A piece without points that need not be digested.
     Nothing,
 }
 
@@ -110,19 +111,21 @@ impl<'a> Map for Load<'a> {
             (InputPiece::Extent(extent), _) if !is_asked(&extent) => return Ok(Loaded::Nothing),
             (InputPiece::Extent(extent), Some(file)) => (extent, file),
             (InputPiece::Extent(_), None) => {
-                return Err(Error::new(Kind::Bug, "there is no file to read a piece from"));
+                return Err(Error::new(
+                    Kind::Bug,
+                    "an input that is read in pieces has no open file",
+                ));
             }
         };
         let start = extent.bytes.start;
-        let own = self.n_bytes.map(|n_bytes| HashTree::own(&extent.bytes, n_bytes));
+        let own = self.n_bytes.map(|n_bytes| HashTree::leaves_of(&extent.bytes, n_bytes));
         let end = own.as_ref().map_or(extent.bytes.end, |own| own.end.max(extent.bytes.end));
         let read = file.read(start, (end - start) as usize);
         let bytes = read.map_err(|e| Error::from(e).at(self.input.path.display()))?;
         if (bytes.len() as u64) < end - start {
-            let error =
-                Error::bad_input("the file was cut short or became unreadable while it was read");
+            let error = Error::bad_input("the file was truncated or removed while it was read");
             let error = error.at(self.input.path.display());
-            return Err(error.hint("start again when it is complete"));
+            return Err(error.hint("start the run again once the file is complete"));
         }
         let parts = own.zip(self.n_bytes).map_or_else(Vec::new, |(own, n_bytes)| {
             let (from, to) = (own.start - start, own.end.max(own.start) - start);
@@ -150,7 +153,7 @@ impl Weigh for Loaded<'_> {
     }
 }
 
-/// Decodes pieces, and does a step to each of their strips.
+/// The map that decodes pieces and applies a step to each of their strips.
 struct OfStrips<'a, M> {
     reading: InputReader<'a>,
     step: &'a M,

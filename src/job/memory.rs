@@ -1,18 +1,19 @@
-//! A size in bytes as people write it in, bytes out, and back.
+//! Sizes in bytes as people write them: parsing and formatting.
 
 use bytesize::ByteSize;
 use contract::{Error, Kind, Result};
 
-/// Largest size that is taken at its word, bytes.
+/// Largest size that is accepted, bytes.
 const MAX: u64 = 9_000_000_000_000_000_000;
 
-/// Bytes of a size such as `4GiB`, `1.5 GB`, `512M` (binary, as most tools read it) or `1000000`.
+/// Parses a size such as `4GiB`, `1.5 GB`, `512M` (binary, as most tools read it) or `1000000` to
+/// bytes.
 ///
 /// # Errors
-/// `Usage` where the text is no size.
+/// `Usage` where the text is not a size.
 pub fn memory_bytes(text: &str) -> Result<u64> {
     let text = text.trim();
-    // The library takes `512M` for the decimal `512MB`.
+    // The library reads `512M` as the decimal `512MB`.
     let is_short = text.ends_with(['k', 'K', 'm', 'M', 'g', 'G', 't', 'T']);
     let whole = if is_short { format!("{text}iB") } else { text.to_owned() };
     match whole.parse::<ByteSize>() {
@@ -22,7 +23,7 @@ pub fn memory_bytes(text: &str) -> Result<u64> {
     }
 }
 
-/// A size for people, in binary units.
+/// Formats a size for people, in binary units.
 #[must_use]
 pub fn memory_words(bytes: u64) -> String {
     format!("{:.2}", ByteSize::b(bytes).display().iec()).replace(".00 ", " ")

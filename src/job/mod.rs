@@ -1,4 +1,5 @@
-//! A job: flags and configuration in, everything that a run needs to know out, checked once.
+//! A job: what a run reads, where it writes and with which memory, threads and settings, taken from
+//! flags and configuration and checked once.
 
 mod memory;
 mod method;
@@ -15,40 +16,42 @@ use crate::engine::CHANNEL_BYTES;
 use contract::{Error, Kind, Result};
 use std::path::{Path, PathBuf};
 
-/// Memory of a run where none is asked for, bytes: half of a small office machine.
+/// Default of `--memory`, bytes: half of the memory of a small office machine.
 pub const MEMORY_BYTES: u64 = 4 << 30;
 /// Memory below which regions are searched one after the other, bytes.
 const NARROW_BYTES: u64 = 3 << 29;
-/// Least memory that a run is tried with, bytes: program, library of robots and one strip a worker.
+/// Least memory that a run accepts, bytes: enough for program, robot library and one strip per
+/// worker.
 pub const LEAST_MEMORY_BYTES: u64 = 256 << 20;
-/// What program and robot library take, bytes, before any point is read.
+/// Memory of the program and the robot library before any point is read, bytes.
 const PROGRAM_BYTES: u64 = 160 << 20;
-/// The setting that bounds configurations, reviews, scenes, paths and lists of readings.
+/// The setting that bounds the length of configurations, reviews, scenes, paths and lists of
+/// readings, bytes.
 pub const MAX_TEXT: &str = "ingest.max_text_bytes";
 
-/// What is to be done, with which means.
+/// Inputs, output folder, memory, threads and settings of a run.
 #[derive(Debug, Clone)]
 pub struct Job {
     /// Scan files, in the order of the command line.
     pub inputs: Vec<PathBuf>,
     /// Folder of the robot library.
     pub robots: PathBuf,
-    /// Scanner poses for formats that carry none.
+    /// File of scanner poses, for formats without poses.
     pub scanners: Option<PathBuf>,
-    /// Where results go.
+    /// Output folder.
     pub out: PathBuf,
-    /// What a person knows of the robots.
+    /// Review file: what a person knows of the robots.
     pub review: Option<PathBuf>,
-    /// Finish without the inputs and regions that fail, and say so.
+    /// Whether to go on without the inputs and regions that fail, and to report them.
     pub keep_going: bool,
-    /// Inputs that were left out because they failed, in words.
+    /// Messages about inputs that were left out because they failed.
     pub left_out: Vec<String>,
-    /// How much, in which way.
+    /// Memory, threads and settings.
     pub means: Means,
 }
 
 impl Job {
-    /// A job as most are: nothing known of scanners and robots, and no failure forgiven.
+    /// A job without scanner poses and review that ends at the first failure.
     #[must_use]
     pub fn new(inputs: Vec<PathBuf>, robots: PathBuf, out: PathBuf, means: Means) -> Self {
         let (scanners, review, keep_going, left_out) = (None, None, false, Vec::new());
@@ -56,37 +59,38 @@ impl Job {
     }
 }
 
-/// Means and settings of any command.
+/// Memory, threads and settings of any command.
 #[derive(Debug, Clone)]
 pub struct Means {
     /// Upper bound of resident memory, bytes.
     pub memory_bytes: u64,
-    /// Worker threads.
+    /// Number of worker threads.
     pub n_threads: usize,
-    /// Scanner poses named by the configuration.
+    /// File of scanner poses that the configuration names.
     pub scanners: Option<PathBuf>,
-    /// Tunables of all stages.
+    /// Settings of all stages.
     pub settings: Settings,
 }
 
-/// What a run came to, for the command line.
+/// Outcome of a run, for the command line.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outcome {
-    /// What people read at the end, on standard output.
+    /// Summary for people, written to standard output at the end.
     pub summary: String,
-    /// Said on standard error; they are in the result as well.
+    /// Warnings, written to standard error and to the result.
     pub warnings: Vec<String>,
-    /// Something was skipped or refused, as the result says: exit code 3.
+    /// Whether something was skipped or refused, as the result states: exit code 3.
     pub partial: bool,
-    /// What was there from earlier runs and not made again; said on standard error.
+    /// Messages about pieces of earlier runs that were used again, written to standard error.
     pub reused: Vec<String>,
-    /// What became of files beside the result; said on standard error, and no part of the result.
-    pub told: Vec<String>,
+    /// Messages about files that were removed beside the result, written to standard error but not
+    /// to the result.
+    pub notes: Vec<String>,
 }
 
-/// Means as flags give them; `None` where a flag is missing.
+/// Values of flags; `None` where a flag is missing.
 #[derive(Debug, Clone, Default)]
-pub struct Given {
+pub struct FlagValues {
     /// `--memory`.
     pub memory: Option<String>,
     /// `--threads`.
@@ -98,20 +102,21 @@ pub struct Given {
 }
 
 impl Means {
-    /// Defaults, then the configuration file, then `--set`, then the other flags.
+    /// Applies in this order: defaults, the configuration file, `--set`, other flags. Later ones
+    /// take precedence.
     ///
     /// # Errors
-    /// A key that does not exist, a value of another kind: usage; a configuration that cannot be
-    /// read: as it is.
-    pub fn of(given: &Given) -> Result<Self> {
+    /// `Usage` for an unknown key or a value of the wrong kind; `BadInput` for a configuration that
+    /// cannot be read.
+    pub fn of(given: &FlagValues) -> Result<Self> {
         let mut means = Self {
             memory_bytes: MEMORY_BYTES,
             n_threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
             scanners: None,
             settings: Settings::default(),
         };
-        // Before the file, since they bound it, too; and after it, since they go before what it
-        // says.
+        // `--set` is applied before the file, whose length it may bound, and again after it, since
+        // it takes precedence.
         means.set_all(&given.set)?;
         if let Some(path) = &given.config {
             means.read(path)?;
@@ -126,30 +131,29 @@ impl Means {
         means.checked()
     }
 
-    /// What the points that wait for their tiles may keep, bytes: a quarter of what the program
-    /// itself leaves. As much goes into vectors that grow by copying and tiles on their way to
-    /// disk; more would not make scans any faster.
+    /// Memory for points that wait for their tiles, bytes: a quarter of what the program itself
+    /// leaves. As much is used by vectors that grow by copying and by tiles on their way to disk;
+    /// more would not make scans faster.
     #[must_use]
     pub fn ingest_bytes(&self) -> usize {
         let free = self.memory_bytes.saturating_sub(PROGRAM_BYTES) / 4;
         usize::try_from(free).unwrap_or(usize::MAX)
     }
 
-    /// What mapped pages of the store may keep resident, bytes.
+    /// Memory for mapped pages of the store, bytes.
     #[must_use]
     pub fn store_bytes(&self) -> usize {
         usize::try_from(self.memory_bytes / 16).unwrap_or(usize::MAX)
     }
 
-    /// What each channel of a pass may keep, bytes: small beside the whole, and never more than is
-    /// of use.
+    /// Most bytes that wait in each channel of a pass.
     #[must_use]
     pub fn channel_bytes(&self) -> usize {
         usize::try_from(self.memory_bytes / 128).unwrap_or(usize::MAX).clamp(1 << 20, CHANNEL_BYTES)
     }
 
-    /// Whether there is too little memory for two regions at once: twenty scans of one take half a
-    /// gigabyte.
+    /// Whether memory is too small for two regions at once: the views of twenty scans of one region
+    /// take half a gigabyte.
     #[must_use]
     pub fn is_narrow(&self) -> bool {
         self.memory_bytes < NARROW_BYTES
@@ -190,8 +194,8 @@ impl Means {
         Ok(())
     }
 
-    /// Takes the settings of a file. What is wrong in it is bad input: the command line that names
-    /// it is right.
+    /// Applies the settings of a configuration file. An error in it is `BadInput`: the command line
+    /// that names the file is right.
     fn read(&mut self, path: &Path) -> Result<()> {
         let text = ingest::read_text(path, self.settings.ingest.max_text_bytes, MAX_TEXT)?;
         let table = text.parse().map_err(|e: toml::de::Error| {
@@ -212,7 +216,7 @@ impl Means {
                 value => self.set(key, value)?,
             }
         }
-        // A path in a configuration is meant from where the configuration lies.
+        // A path in a configuration is relative to the folder of the configuration.
         if let (Some(scanners), Some(dir)) = (&self.scanners, path.parent()) {
             self.scanners = Some(dir.join(scanners));
         }
@@ -250,7 +254,7 @@ impl Means {
     }
 }
 
-/// A value on the command line: TOML where it is, else a word.
+/// Parses a value of the command line: TOML where it parses, else a word.
 fn parsed(text: &str) -> toml::Value {
     let table = format!("v = {text}").parse::<toml::Table>();
     table.ok().and_then(|mut t| t.remove("v")).unwrap_or_else(|| toml::Value::String(text.into()))
@@ -271,7 +275,7 @@ mod tests {
 
     fn with(set: &[&str]) -> Result<Means> {
         let set = set.iter().map(ToString::to_string).collect();
-        Means::of(&Given { set, ..Given::default() })
+        Means::of(&FlagValues { set, ..FlagValues::default() })
     }
 
     #[test]
@@ -281,7 +285,7 @@ mod tests {
         let text =
             "memory = \"8GiB\"\nthreads = 3\nscanners = \"s.toml\"\n[fit]\nbeam = 77\nthin = 1\n";
         std::fs::write(&path, text).expect("writes");
-        let given = Given {
+        let given = FlagValues {
             memory: Some("1 GiB".into()),
             threads: None,
             config: Some(path),
@@ -303,7 +307,7 @@ mod tests {
             let written = again.all().into_iter().find(|(k, _)| *k == key).map(|(_, v)| v);
             assert_eq!(written, Some(value), "{key}");
         }
-        // Single precision does not hold it.
+        // Single precision cannot represent this value.
         let single = settings.all().into_iter().any(|(key, _)| {
             let huge = toml::Value::Float(1e300);
             let mut again = settings.clone();
@@ -338,7 +342,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a folder");
         let path = dir.path().join("plant.toml");
         std::fs::write(&path, "threads = 2\n[fit\n").expect("writes");
-        let given = Given { config: Some(path), ..Given::default() };
+        let given = FlagValues { config: Some(path), ..FlagValues::default() };
         let error = Means::of(&given).expect_err("broken").to_string();
         assert!(error.contains("plant.toml: line 2: this is not TOML"), "{error}");
     }

@@ -1,5 +1,5 @@
-//! The paths of a job in; an error where they cannot be, or where what the job writes would meet
-//! what it reads.
+//! Checks the paths of a job: each input exists and is named once, and nothing that the job reads
+//! lies where it writes.
 
 use super::Job;
 use crate::io::own_paths::{FILES, FOLDERS, refuse_link};
@@ -7,34 +7,35 @@ use contract::{Error, Kind, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What a run writes into its output folder besides what its result names: what a user keeps there
-/// else is left alone.
+/// Names that a run writes into its output folder besides the files of its result. Anything else
+/// that a user keeps there is left alone.
 const STORE: &str = "store";
 const LIST: &str = "manifest.json";
 
 impl Job {
-    /// Checks that everything the job reads is there, is named once, and is nothing that it writes.
+    /// Checks that each file the job reads exists, is named once and does not lie where the job
+    /// writes.
     ///
     /// # Errors
-    /// A path of which that is not so, by its name.
+    /// The first path that fails one of these checks, by name.
     pub(crate) fn check_places(&self) -> Result<()> {
         let others = self.scanners.iter().chain(&self.review);
         if !self.robots.is_dir() {
-            return Err(Error::bad_input("there is no such folder")
+            return Err(Error::bad_input("the folder of the robot library does not exist")
                 .at(self.robots.display())
-                .hint("--robots takes a folder with a folder for each model"));
+                .hint("--robots takes a folder that has one folder for each model"));
         }
         for file in self.inputs.iter().chain(others.clone()) {
             ingest::regular(file)?;
             if file.to_str().is_none() {
-                let what = "its name is not UTF-8, and results name their inputs";
-                return Err(Error::bad_input(what).at(file.display()).hint("rename it"));
+                let what = "the name of this file is not UTF-8, and results name their inputs";
+                return Err(Error::bad_input(what).at(file.display()).hint("rename the file"));
             }
         }
         let mut seen: BTreeMap<PathBuf, &Path> = BTreeMap::new();
         for input in &self.inputs {
             if let Some(before) = seen.insert(real(input), input) {
-                let what = format!("the same file as {}", before.display());
+                let what = format!("this input is the same file as {}", before.display());
                 return Err(usage(&what, input).hint("name each input once"));
             }
         }
@@ -45,20 +46,21 @@ impl Job {
         let library = real(&self.robots);
         if out.starts_with(&library) {
             return Err(usage("the output folder lies in the robot library", &self.out)
-                .hint("results beside a model would be taken for one: give an --out elsewhere"));
+                .hint("a result there would be read as a robot model: give an --out elsewhere"));
         }
         self.check_kept(&library, &out, &self.robots)
     }
 
-    /// Refuses an output folder that is, holds or lies in the result that a rescan goes on from.
+    /// Refuses an output folder that is, contains or lies in `base`, the result that a rescan
+    /// starts from.
     ///
     /// # Errors
-    /// It does.
-    pub(crate) fn apart(&self, base: &Path) -> Result<()> {
-        apart(base, &self.out)
+    /// One of the folders contains the other.
+    pub(crate) fn refuse_base_overlap(&self, base: &Path) -> Result<()> {
+        refuse_overlap(base, &self.out)
     }
 
-    /// Refuses a path that the job reads where it writes.
+    /// Refuses a path that the job reads and would overwrite.
     fn check_kept(&self, path: &Path, out: &Path, named: &Path) -> Result<()> {
         let Ok(inside) = path.strip_prefix(out) else { return Ok(()) };
         let first = inside.components().next();
@@ -68,8 +70,10 @@ impl Job {
             names.into_iter().any(|name| first == name) || inside.as_os_str().is_empty()
         };
         if first.as_ref().is_none_or(is_ours) {
-            let what = format!("is read and would be written over in {}", self.out.display());
-            return Err(usage(&what, named).hint("give another --out, or move it"));
+            let out = self.out.display();
+            let what =
+                format!("this path is an input and would be overwritten by the result in {out}");
+            return Err(usage(&what, named).hint("give another --out, or move the input"));
         }
         Ok(())
     }
@@ -79,11 +83,11 @@ fn usage(what: &str, path: &Path) -> Error {
     Error::new(Kind::Usage, what).at(path.display())
 }
 
-/// Refuses an output folder in which what a run writes, moves or takes away would lie elsewhere,
-/// since a link leads there. The folder itself may be a link.
+/// Refuses an output folder in which a symbolic link would lead files of the run elsewhere. The
+/// output folder itself may be a link.
 ///
 /// # Errors
-/// The first link.
+/// The first symbolic link that is found.
 pub(crate) fn refuse_links(out: &Path) -> Result<()> {
     for name in FILES.iter().chain(&[LIST, STORE]) {
         refuse_link(&out.join(name))?;
@@ -92,7 +96,7 @@ pub(crate) fn refuse_links(out: &Path) -> Result<()> {
     let mut folders: Vec<PathBuf> = FOLDERS.iter().map(|name| out.join(name)).collect();
     while let Some(folder) = folders.pop() {
         refuse_link(&folder)?;
-        // What is not there is made, and what cannot be read is told when it is written to.
+        // A missing folder is made later, and an unreadable one is reported when it is written to.
         for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
             match entry.file_type() {
                 Ok(kind) if kind.is_symlink() => refuse_link(&entry.path())?,
@@ -104,25 +108,25 @@ pub(crate) fn refuse_links(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Refuses two folders of which one is, or lies in, the other.
+/// Refuses an output folder that is, contains or lies in the folder of the earlier result.
 ///
 /// # Errors
-/// They are so.
-fn apart(base: &Path, out: &Path) -> Result<()> {
+/// One of the folders contains the other.
+fn refuse_overlap(base: &Path, out: &Path) -> Result<()> {
     let (within, outside) = (real(out), real(base));
     let what = if within == outside {
-        "a rescan does not write over the result it goes on from"
+        "a rescan does not overwrite the result that it starts from"
     } else if within.starts_with(&outside) {
-        "the output folder lies in the result that the rescan goes on from"
+        "the output folder lies in the result that the rescan starts from"
     } else if outside.starts_with(&within) {
-        "the result that the rescan goes on from lies in the output folder"
+        "the result that the rescan starts from lies in the output folder"
     } else {
         return Ok(());
     };
     Err(usage(what, out).hint("give another --out, beside the earlier result"))
 }
 
-/// The path without links and dots; of what is not there, as far as it is there.
+/// The absolute path without links and dots, as far as the path exists.
 fn real(path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
     for there in path.ancestors() {
@@ -136,7 +140,7 @@ fn real(path: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Given, Means};
+    use crate::job::{FlagValues, Means};
 
     #[test]
     fn what_is_read_is_never_written() {
@@ -150,7 +154,7 @@ mod tests {
         }
         let checked = |inputs: &[&str], robots: &str, out: &str| {
             let inputs = inputs.iter().map(|i| at(i)).collect();
-            let means = Means::of(&Given::default()).expect("defaults");
+            let means = Means::of(&FlagValues::default()).expect("defaults");
             Job::new(inputs, at(robots), at(out), means).check_places()
         };
         for good in
@@ -201,10 +205,10 @@ mod tests {
             ("link/robots", "out"),
             ("base", "."),
         ] {
-            let error = apart(&at(base), &at(out)).expect_err(out);
+            let error = refuse_overlap(&at(base), &at(out)).expect_err(out);
             assert_eq!(error.kind(), Kind::Usage);
         }
-        apart(&at("base"), &at("plain")).expect("lie apart");
-        apart(&at("base"), &at("base2")).expect("lie apart");
+        refuse_overlap(&at("base"), &at("plain")).expect("lie apart");
+        refuse_overlap(&at("base"), &at("base2")).expect("lie apart");
     }
 }

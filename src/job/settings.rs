@@ -1,15 +1,15 @@
-//! Settings of all stages, nested; a key such as `fit.beam` and a value in, the changed setting
-//! out. A key that no stage has is refused. `tests/house.rs` holds this list against the stages'
-//! own.
+//! Settings of all stages by name: a key such as `fit.beam` and a value change one setting, and a
+//! key that no stage has is refused. `tests/house.rs` compares this list with the settings of the
+//! stages.
 
 use super::method::Method;
 use super::value::{Value, assign};
 use contract::{Error, Kind, Result};
 
-/// Names the settings that can be set, room by room.
+/// Declares the settings that can be set, stage by stage.
 macro_rules! settings {
     ($($room:ident: $kind:path { $($field:ident),* $(,)? })*) => {
-        /// Tunables of all stages.
+        /// Settings of all stages.
         #[derive(Debug, Clone, Default)]
         pub struct Settings {
             /// How postures are found.
@@ -21,10 +21,10 @@ macro_rules! settings {
         }
 
         impl Settings {
-            /// Sets one of them, by its name `room.field`.
+            /// Sets the setting with the name `stage.field`.
             ///
             /// # Errors
-            /// No such name, or a value of another kind.
+            /// `Usage` for an unknown name or a value of the wrong kind.
             pub fn set(&mut self, key: &str, value: &toml::Value) -> Result<()> {
                 let key = &present_name(key);
                 if key == METHOD {
@@ -38,8 +38,8 @@ macro_rules! settings {
                 Err(unknown(key))
             }
 
-            /// All of them with their values, in the order of rooms and fields: the record of a
-            /// run.
+            /// All settings with their values, in the order of stages and fields, for the record of
+            /// a run.
             #[must_use]
             pub fn all(&self) -> Vec<(&'static str, toml::Value)> {
                 let mut all = vec![$($((
@@ -120,8 +120,8 @@ settings! {
     }
 }
 
-/// Beginnings of names that settings had in earlier versions, and those that they have now: job
-/// files and command lines that were written for them go on to work. The first that fits counts.
+/// Former and present prefixes of names of settings, so that configurations and command lines of
+/// earlier versions keep working. The first match is used.
 const RENAMED: [(&str, &str); 4] = [
     ("identify.", "base_search."),
     ("merge.space_edge", "freespace.edge"),
@@ -129,7 +129,7 @@ const RENAMED: [(&str, &str); 4] = [
     ("merge.", "attach."),
 ];
 
-/// The name that a setting has now, whatever it was called before.
+/// The present name of a setting that may be given by a former one.
 fn present_name(key: &str) -> String {
     let renamed = RENAMED.iter().find_map(|(old, new)| Some((new, key.strip_prefix(old)?)));
     renamed.map_or_else(|| key.into(), |(new, rest)| format!("{new}{rest}"))
@@ -149,7 +149,7 @@ fn unknown(key: &str) -> Error {
     }
 }
 
-/// Edits that make one word of the other.
+/// Number of single-letter edits between two words.
 fn distance(a: &str, b: &str) -> usize {
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.bytes().enumerate() {

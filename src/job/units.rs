@@ -1,5 +1,5 @@
-//! Opened inputs in; the units that they are read in, in words and for the result, out; and whether
-//! robots of a library can stand in them.
+//! Units of opened inputs: as messages for people, as entries of the result, and checks whether
+//! robots of the library fit into clouds of that size.
 
 use contract::words::count;
 use contract::{Input, Result};
@@ -8,7 +8,7 @@ use ingest::{Origin, Sources};
 use robot::Library;
 use std::path::Path;
 
-/// The units of inputs, in words: one line for all inputs of the same.
+/// Messages that name the units of all inputs: one line for all inputs with the same units.
 pub(crate) fn in_words(sources: &Sources) -> Vec<String> {
     let all = sources.opened().iter().filter_map(|input| sources.units(input.id));
     let all: Vec<String> = all.map(ToString::to_string).collect();
@@ -22,7 +22,7 @@ pub(crate) fn in_words(sources: &Sources) -> Vec<String> {
     out.into_iter().map(|(text, n)| format!("{text}: {}", count(n as u64, "input"))).collect()
 }
 
-/// The units of an opened input, for the result.
+/// The units of an opened input, as an entry of the result.
 pub(crate) fn entry(sources: &Sources, input: &Input) -> Option<UnitsEntry> {
     let units = sources.units(input.id)?;
     let origin = match units.origin {
@@ -34,11 +34,12 @@ pub(crate) fn entry(sources: &Sources, input: &Input) -> Option<UnitsEntry> {
     Some(UnitsEntry { text: units.to_string(), origin: origin.into(), metres: units.factors() })
 }
 
-/// Clouds that are larger hold a robot of any library, metres: a fifth of the largest one's reach.
+/// Extent above which a cloud is large enough for any robot library, metres: a fifth of the reach
+/// of the largest robot.
 const LARGE_ENOUGH: f64 = 1.0;
 
-/// As [`check_sizes`], of a library that is not loaded yet: it is only where clouds are so small
-/// that its robots decide.
+/// Like [`check_sizes`], for a library that is not loaded yet. It is loaded only where a cloud is
+/// so small that the size of its robots matters.
 pub(crate) fn check_plan(robots: &Path, sources: &Sources) -> Result<()> {
     sources.check_sizes()?;
     let spread = sources.spread();
@@ -49,8 +50,8 @@ pub(crate) fn check_plan(robots: &Path, sources: &Sources) -> Result<()> {
     check_sizes(&Library::load(robots, &robot::Settings::without_clouds())?, sources)
 }
 
-/// Refuses inputs that cannot be of a plant with robots of this library, in the units that they are
-/// read in.
+/// Refuses inputs that, in the units that they are read in, are too small or too large for a plant
+/// with robots of this library.
 pub(crate) fn check_sizes(library: &Library, sources: &Sources) -> Result<()> {
     sources.check_sizes()?;
     let arms = library.models.iter().filter(|model| !model.is_tool());

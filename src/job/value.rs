@@ -1,16 +1,16 @@
-//! One setting: a TOML value in, a plain number or word out, and back.
+//! Conversion of a single setting between TOML and its Rust type.
 
 use super::method::Method;
 use contract::{Error, Kind, Result};
 use toml::Value as Toml;
 
-/// A kind of setting.
+/// A type that a setting can have.
 pub(super) trait Value: Sized {
-    /// What it is, for people.
+    /// Name of the type, for messages.
     fn kind() -> String;
-    /// From TOML; `None` where it is of another kind.
+    /// Converts from TOML; `None` where the value has another type.
     fn read(value: &Toml) -> Option<Self>;
-    /// To TOML.
+    /// Converts to TOML.
     fn write(&self) -> Toml;
 }
 
@@ -49,10 +49,10 @@ impl Value for f32 {
         f64::kind()
     }
     fn read(value: &Toml) -> Option<Self> {
-        // A number that single precision cannot hold would become infinite.
+        // A number beyond the range of single precision would become infinite.
         f64::read(value).map(|v| v as f32).filter(|v| v.is_finite())
     }
-    /// As short as it was written: 0.025, not 0.02500000037.
+    /// The shortest text that reads back the same: 0.025, not 0.02500000037.
     fn write(&self) -> Toml {
         Toml::Float(self.to_string().parse().unwrap_or(f64::from(*self)))
     }
@@ -111,13 +111,13 @@ impl<T: Value, const N: usize> Value for [T; N] {
     }
 }
 
-/// Optional settings are absent from the record where they are not set.
+/// Optional settings without a value are absent from the record of a run.
 impl<T: Value> Value for Option<T> {
     fn kind() -> String {
         T::kind()
     }
     fn read(value: &Toml) -> Option<Self> {
-        // What is written of one that is not set reads back as that.
+        // A setting without a value is written as "none" and must read back as such.
         if value.as_str() == Some("none") { Some(None) } else { T::read(value).map(Some) }
     }
     fn write(&self) -> Toml {
@@ -125,7 +125,7 @@ impl<T: Value> Value for Option<T> {
     }
 }
 
-/// Puts a TOML value into a setting.
+/// Assigns a TOML value to a setting.
 pub(super) fn assign<T: Value>(to: &mut T, key: &str, value: &Toml) -> Result<()> {
     *to = T::read(value).ok_or_else(|| {
         let given = value.as_str().map_or_else(|| value.to_string(), Into::into);

@@ -1,13 +1,13 @@
-//! Clusters in; which of them a place belongs to, out.
+//! Look-up of the cluster that a position belongs to.
 
 use contract::{Cluster, Voxel};
 use geometry::narrow::floor_i32;
 
-/// Clusters by voxel.
+/// Clusters indexed by voxel.
 pub(crate) struct ClusterLookup {
-    /// 1 / edge of a voxel, 1/m.
+    /// Inverse of the voxel edge, 1/m.
     inverse: f64,
-    /// Sorted by voxel.
+    /// Voxels and their clusters, sorted by voxel.
     voxels: Vec<(Voxel, u32)>,
 }
 
@@ -20,9 +20,10 @@ impl ClusterLookup {
         Self { inverse: 1.0 / edge, voxels }
     }
 
-    /// Number of the body + 1 of each point; 0 for the floor and for dust.
+    /// For each position (world frame, metres) the number of its cluster plus 1; 0 for the floor
+    /// and for scattered points.
     pub(crate) fn of(&self, world: &[[f64; 3]]) -> Vec<u32> {
-        // Neighbours mostly fall into the same voxel.
+        // Consecutive points mostly fall into the same voxel.
         let mut last: Option<(Voxel, u32)> = None;
         let one = |p: &[f64; 3]| {
             let voxel = p.map(|v| floor_i32(v * self.inverse));

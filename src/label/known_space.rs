@@ -1,6 +1,5 @@
-//! Fits and what the scans saw about them in; around each robot, which space was seen free, which
-//! it and other robots fill and which nobody has seen, out. Points are marked into it while they
-//! are labelled.
+//! Known space around each robot: which voxels beams have passed through, which the robot and
+//! others fill, and which no scan has seen. Points are marked in it while they are labelled.
 
 use crate::detect::robots::FittedRobots;
 use crate::detect::search::Search;
@@ -13,27 +12,26 @@ use lattice::ViewSettings;
 use robot::Model;
 use std::ops::Range;
 
-/// Depth images need cells this much smaller than the voxels, so that each voxel is looked at
-/// through its middle.
+/// Number of cells of a depth image per voxel edge, so that each voxel is looked at through its
+/// middle.
 const CELLS_PER_EDGE: f64 = 3.0;
-/// Room behind a base that belongs to its robot's space, as a share of its reach: what stands on a
-/// pedestal reaches below.
+/// Depth behind a base that belongs to its robot's space, as a share of its reach: a robot on a
+/// pedestal reaches below its base.
 const BEHIND: f64 = 0.5;
-/// Vertical part of a base's axis from which on its robot stands, or hangs: 60°.
+/// Least vertical component of a base's axis for a standing or hanging robot: 60° of tilt.
 const UPRIGHT: f64 = 0.5;
 
-/// What spaces are made of.
+/// Robots and search from which known spaces are computed.
 pub(crate) struct KnownSpaces<'a, 's> {
-    /// Robots of the plant, and the models that they are of.
+    /// Robots of the plant and their models.
     pub(crate) robots: FittedRobots<'a>,
-    /// Who has what the scans saw.
+    /// The search, which has the views of the scans.
     pub(crate) search: &'a Search<'a, 's>,
     pub(crate) settings: &'a Settings,
 }
 
 impl KnownSpaces<'_, '_> {
-    /// The spaces of all robots, in the order of the fits; none where no scan says where its beams
-    /// went.
+    /// The spaces of all robots, in the order of the fits; `None` where no scan has beams.
     pub(crate) fn all(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
         let FittedRobots { fits, models } = self.robots;
         if !self.settings.freespace.enabled {
@@ -45,13 +43,12 @@ impl KnownSpaces<'_, '_> {
             let model = &models[fits[i].model];
             let grid = SpaceGrid::over(&bounds(&fits[i], model.reach()).shared(&known), edge);
             let mut space = self.seen(i, grid)?;
-            space.iter_mut().for_each(|space| self.stand(space, i));
+            space.iter_mut().for_each(|space| self.fill_robots(space, i));
             Ok(space)
         })
     }
 
-    /// What beams went through about a robot, in these voxels; none where no scan says where its
-    /// beams went.
+    /// The voxels of `grid` that beams have passed through; `None` where no scan has beams.
     pub(crate) fn seen(&self, robot: usize, grid: SpaceGrid) -> Result<Option<Space>> {
         let base: Point = self.robots.fits[robot].world_from_base.translation.vector.into();
         let region = region(&base, &grid.bounds());
@@ -69,8 +66,8 @@ impl KnownSpaces<'_, '_> {
         Ok(Some(space))
     }
 
-    /// Fills what robots fill, last the one whose space it is.
-    pub(crate) fn stand(&self, space: &mut Space, robot: usize) {
+    /// Fills the voxels of all robots, last those of the robot whose space it is.
+    pub(crate) fn fill_robots(&self, space: &mut Space, robot: usize) {
         let FittedRobots { fits, models } = self.robots;
         let bounds = space.grid().bounds();
         let is_other = |i: usize, fit: &Fit| {
@@ -86,7 +83,7 @@ impl KnownSpaces<'_, '_> {
     }
 }
 
-/// World bounds of a robot as it stands.
+/// Bounds of a robot in its fitted posture, world frame, metres.
 pub(crate) fn standing(fit: &Fit, model: &Model) -> Aabb {
     let mut out = Aabb::EMPTY;
     for (link, pose) in model.links.iter().zip(poses(fit, model)) {
@@ -97,21 +94,21 @@ pub(crate) fn standing(fit: &Fit, model: &Model) -> Aabb {
     out
 }
 
-/// The region of all that a robot can get to.
+/// The region of all positions that a robot can reach.
 pub(crate) fn reach(fit: &Fit, model: &Model) -> Region {
     let base: Point = fit.world_from_base.translation.vector.into();
     region(&base, &bounds(fit, model.reach()))
 }
 
-/// A region of the world, its frame near `middle`.
+/// A region with bounds `world` and a frame whose origin is near `middle`, metres.
 pub(crate) fn region(middle: &Point, world: &Aabb) -> Region {
     let origin = middle.map(f64::round);
     let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
     Region { origin, bounds: Aabb { min: shift(world.min), max: shift(world.max) } }
 }
 
-/// All that a robot can get to, and no more behind its foot than pedestals are high: below one that
-/// stands, above one that hangs.
+/// Bounds of all positions within `reach` of a robot, but behind its foot no farther than pedestals
+/// are high: below a standing robot, above a hanging one (world frame, metres).
 pub(crate) fn bounds(fit: &Fit, reach: f64) -> Aabb {
     let base = fit.world_from_base.translation.vector;
     let mut out = Aabb::EMPTY;
@@ -126,17 +123,16 @@ pub(crate) fn bounds(fit: &Fit, reach: f64) -> Aabb {
     out
 }
 
-/// World from the links of a fitted robot.
+/// Poses of the links of a fitted robot in the world frame.
 pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
     let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     model.poses(&posture).into_iter().map(|p| fit.world_from_base * p).collect()
 }
 
-/// A point in a voxel of a space: number of the space, of the voxel, and what the point makes of
-/// it.
+/// Index of a space, index of a voxel in it, and the kind that a point gives to that voxel.
 pub(crate) type VoxelMark = (usize, usize, SpaceKind);
 
-/// Grids of spaces, with their bounds in the world.
+/// Grids of spaces, with their bounds in the world frame.
 pub(crate) struct SpaceGrids(Vec<Option<(SpaceGrid, Aabb)>>);
 
 impl SpaceGrids {
@@ -145,8 +141,8 @@ impl SpaceGrids {
         Self(spaces.iter().map(grid).collect())
     }
 
-    /// Which voxels labelled points fall into, where `counts` says that a point counts; the same
-    /// voxel once in a row. `blocks` are bounds of runs of points.
+    /// The voxels of labelled points for which `counts` is true, without repeats of the same voxel
+    /// in a row. `blocks` are the bounds of runs of points.
     pub(crate) fn spots(
         &self,
         world: &[[f64; 3]],
@@ -172,7 +168,7 @@ impl SpaceGrids {
     }
 }
 
-/// Puts points into their spaces.
+/// Marks the voxels of points in their spaces.
 pub(crate) fn mark(spaces: &mut [Option<Space>], spots: impl IntoIterator<Item = VoxelMark>) {
     for (space, voxel, kind) in spots {
         spaces[space].iter_mut().for_each(|s| s.mark(voxel, kind));

@@ -1,5 +1,5 @@
-//! A strip in; its labels, its records for the clouds, and what pictures and spaces take of it,
-//! out: the map of the second pass, so that those that write have only to copy.
+//! The map of the second pass: labels a strip and prepares its records for the clouds, its pixels
+//! for the pictures and its voxels for the spaces, so that the writers only copy.
 
 use super::cluster_lookup::ClusterLookup;
 use super::known_space::{SpaceGrids, VoxelMark};
@@ -9,44 +9,46 @@ use geometry::{Aabb, Point, Pose};
 use segment::FloorHeights;
 use std::ops::Range;
 
-/// Points whose bounds are looked at together: neighbours of a scan are near each other.
+/// Number of consecutive points with common bounds: neighbours in a scan lie near each other.
 const BLOCK: usize = 128;
-/// Of so many points that stand still near a robot, one is drawn: its picture has fewer pixels than
-/// they are.
+/// One of so many fixed points near a robot is drawn: a picture has fewer pixels than there are
+/// points.
 const DRAWN: u64 = 4;
 
-/// The map of the second pass.
+/// The map of the second pass, with everything that it looks up.
 pub(crate) struct LabelStrip<'a> {
-    /// Labels of points near robots: for each mask, by place.
+    /// Labels of points near robots, for each mask, sorted by place.
     pub(crate) near: &'a [Vec<PlaceRun<Label>>],
     pub(crate) ground: &'a FloorHeights,
     pub(crate) scans: &'a [Scan],
-    /// Voxels of the robots' spaces.
+    /// Voxel grids of the robots' spaces.
     pub(crate) grids: &'a SpaceGrids,
-    /// What the picture of each robot shows.
+    /// Bounds that the picture of each robot shows, world frame, metres.
     pub(crate) shown: &'a [Aabb],
     pub(crate) plan: &'a PlanPicture,
     pub(crate) pack: Pack,
-    /// Bounds that records of the clouds are written in; labels outside stay uncertain. All where
-    /// left out.
+    /// Bounds of the records that are written to clouds, world frame, metres; labels outside stay
+    /// uncertain. `None` for no bounds.
     pub(crate) cell: Option<Aabb>,
-    /// World as it is from the world as the file states it, by scan, where that differs.
+    /// For each scan, the motion from the world frame of the file to that of the plant, where they
+    /// differ.
     pub(crate) moved: &'a [Option<Pose>],
-    /// Connected bodies, where points are to be told which is theirs.
+    /// Clusters, where each point is to get the number of its cluster.
     pub(crate) bodies: Option<&'a ClusterLookup>,
 }
 
 /// A labelled strip.
 pub(crate) struct LabelledStrip {
     pub(crate) mask: MaskId,
-    /// As in [`Strip`].
+    /// Place of its first point, as in [`Strip`].
     pub(crate) first_place: u64,
     pub(crate) place: Vec<u32>,
     pub(crate) labels: LabelColumns,
     pub(crate) n_moving: u64,
     pub(crate) packed: Packed,
     pub(crate) spots: Vec<VoxelMark>,
-    /// Points that pictures of robots show: number of the robot, world, label.
+    /// Points that pictures of robots show: index of the robot, position in the world frame
+    /// (metres), label.
     pub(crate) shown: Vec<(usize, [f64; 3], Label)>,
 }
 
@@ -96,7 +98,7 @@ impl Map for LabelStrip<'_> {
 }
 
 impl LabelStrip<'_> {
-    /// The labels of a strip's points: those that are known near robots, else those of their places
+    /// Labels of a strip's points: from the list of points near robots, else from their position
     /// alone.
     fn labels(&self, strip: &Strip, world: &[[f64; 3]]) -> Vec<Label> {
         let mut labels: Vec<Label> = world.iter().map(|p| self.ground.label(*p)).collect();
@@ -117,7 +119,7 @@ impl LabelStrip<'_> {
         labels
     }
 
-    /// Records of those points that lie in the cell and that some cloud holds.
+    /// Records of the points that lie in the cell and belong to some cloud.
     fn packed(&self, points: &PointColumns<'_>) -> Result<Packed> {
         let is_held = |i: &usize| {
             let is_inside = self.cell.is_none_or(|cell| cell.contains(points.world[*i]));
@@ -174,8 +176,8 @@ pub(crate) fn blocks(world: &[[f64; 3]]) -> Vec<(Range<usize>, Aabb)> {
     world.chunks(BLOCK).enumerate().map(block).collect()
 }
 
-/// World coordinates of a strip's points: those of the file where it states them, moved where that
-/// has to be.
+/// World coordinates of a strip's points, metres: those of the file where it states them, moved by
+/// `moved` where that is given.
 fn world(strip: &mut Strip, scan: &Scan, moved: Option<&Pose>) -> Vec<[f64; 3]> {
     match &mut strip.attributes {
         Some(a) if a.world.len() == strip.xyz.len() => {

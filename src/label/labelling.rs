@@ -1,9 +1,9 @@
-//! Fits in; the label of every point out, in the order of its file, written as masks, clouds and
+//! Labels all points of the inputs, in the order of their files, and writes masks, clouds and
 //! pictures.
 //!
-//! Tiles near robots are segmented and what hangs on the robots is decided over all scans; that
-//! leaves a sorted list of labels by place. Then each input is streamed once more: a point's label
-//! is that of the list, or else that of its place alone (floor or fixed).
+//! Tiles near robots are segmented, and bodies attached to robots are decided over all scans, which
+//! gives a sorted list of labels by place. Then each input is streamed again: a point's label is
+//! that of the list, or else that of its position alone (floor or fixed).
 
 use super::cluster_lookup::ClusterLookup;
 use super::known_space::{SpaceGrids, mark, poses};
@@ -28,11 +28,10 @@ use robot::Model;
 use segment::FloorHeights;
 use std::path::Path;
 
-/// Records that wait for their tiles may take so many times what a channel does, where memory is
-/// short.
+/// Factor on the channel bytes for records that wait for their tiles, where memory is short.
 const SPOOLED: usize = 8;
 
-/// What labelling reads.
+/// Job, scans, robots and floor that labelling reads.
 pub(crate) struct Labelling<'a> {
     fits: &'a [Fit],
     models: &'a [Model],
@@ -41,14 +40,14 @@ pub(crate) struct Labelling<'a> {
     ground: FloorHeights,
     settings: segment::Settings,
     attach: attach::Settings,
-    /// World bounds of each scan's points, metres.
+    /// Bounds of each scan's points, world frame, metres.
     bounds: Vec<Aabb>,
     export: export::Settings,
-    /// Where points are to be told which body is theirs.
+    /// Clusters, where each point is to get the number of its cluster.
     bodies: Option<ClusterLookup>,
 }
 
-/// The scans whose points are labelled, and what stands in them besides robots.
+/// The scans whose points are labelled, and floor and clusters in them.
 pub(crate) struct ScansToLabel<'a> {
     pub(crate) sources: &'a Sources,
     pub(crate) store: &'a Store,
@@ -56,23 +55,23 @@ pub(crate) struct ScansToLabel<'a> {
     pub(crate) clusters: &'a [Cluster],
 }
 
-/// Where files go.
+/// Folders of the files that are written.
 #[derive(Clone, Copy)]
 pub(crate) struct LabelFolders<'l> {
-    /// Masks, tiles, pictures and files of robots.
+    /// Folder of masks, tiles, pictures and files of robots.
     pub(crate) out: &'l Path,
-    /// Clouds.
+    /// Folder of clouds.
     pub(crate) clouds: &'l Path,
 }
 
-/// What takes the points of the second pass, beside masks and clouds.
+/// Receivers of the points of the second pass besides masks and clouds.
 struct PointTakers<'t> {
     spaces: &'t mut [Option<Space>],
     robots: &'t mut [RobotPicture],
     tiles: &'t mut Option<Tiles>,
 }
 
-/// How points are labelled and packed.
+/// Settings for labelling points and packing records.
 struct SecondPass<'p> {
     near: &'p NearRobots,
     scope: &'p Scope,
@@ -80,43 +79,45 @@ struct SecondPass<'p> {
     out: &'p Path,
 }
 
-/// Which part of a plant is written: all of it, unless said otherwise.
+/// The part of a plant that is written; the default is all of it.
 #[derive(Default)]
 pub(crate) struct Scope {
-    /// Robots whose files are written, by their places among the fits; all where left out.
+    /// Indices of the fits whose files are written; `None` for all.
     pub(crate) robots: Option<Vec<usize>>,
-    /// As in [`LabelStrip`].
+    /// As [`LabelStrip::cell`].
     pub(crate) cell: Option<Aabb>,
-    /// As in [`LabelStrip`].
+    /// As [`LabelStrip::moved`].
     pub(crate) moved: Vec<Option<Pose>>,
-    /// What records hold, where clouds are to be like others.
+    /// Layout of LAS records, where clouds must match earlier ones.
     pub(crate) las: Option<LasSettings>,
-    /// Whether spatial tiles are left open: something else comes into them.
+    /// Whether spatial tiles are left open, so that more points can be added.
     pub(crate) leaves_open: bool,
 }
 
-/// What was written.
+/// Counts and names of the files that were written.
 pub(crate) struct WrittenLabels {
     pub(crate) clouds: WrittenFiles,
-    /// For each mask: entries, points that were dropped, and points that are said to move.
+    /// For each mask the numbers of its entries, of dropped points and of points labelled as
+    /// moving.
     pub(crate) masks: Vec<MaskCount>,
-    /// Pictures, relative to the output folder.
+    /// Paths of pictures, relative to the output folder.
     pub(crate) pictures: Vec<String>,
-    /// What is known of the space around each robot.
+    /// Entry of the known space of each robot.
     pub(crate) spaces: Vec<Option<SpaceEntry>>,
-    /// Checksums of the files that are as large as the cloud.
+    /// Checksums of masks, tiles and clouds.
     pub(crate) digests: Vec<FileSum>,
-    /// What records of the clouds hold.
+    /// Layout of the LAS records of clouds.
     pub(crate) las: LasSettings,
 }
 
-/// Masks and clouds that are written; the files of robots are still to be.
+/// State after masks and clouds are written; the files of robots are written by
+/// [`Streamed::finish`].
 pub(crate) struct Streamed<'l> {
     labelling: &'l Labelling<'l>,
     near: &'l NearRobots,
-    /// By fit.
+    /// Known space of each fit.
     spaces: Vec<Option<Space>>,
-    /// Fits whose files are to be written, with their pictures.
+    /// Indices of the fits whose files are written, with their pictures.
     robots: Vec<(usize, RobotPicture)>,
     /// Tiles that were left open.
     open: Vec<Spool>,
@@ -125,13 +126,13 @@ pub(crate) struct Streamed<'l> {
 }
 
 impl Streamed<'_> {
-    /// The tiles that were left open.
+    /// Takes the spatial tiles that were left open.
     pub(crate) fn take_open(&mut self) -> Vec<Spool> {
         std::mem::take(&mut self.open)
     }
 
-    /// The spaces, by fit, where something else is still to be marked in them; they are not written
-    /// then.
+    /// Takes the spaces of all fits so that more can be marked in them; they are then not written
+    /// here.
     pub(crate) fn take_spaces(&mut self) -> Vec<Option<Space>> {
         let none = vec![None; self.spaces.len()];
         std::mem::replace(&mut self.spaces, none)
@@ -177,7 +178,7 @@ impl<'a> Labelling<'a> {
         &self.ground
     }
 
-    /// The labels of points near the robots, and what hangs on them.
+    /// Labels of points near the robots, and the bodies attached to them.
     pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<NearRobots> {
         let robots = FittedRobots { fits: self.fits, models: self.models };
         let (scans, n_masks) = (self.sources.scans.as_slice(), self.sources.masks.len());
@@ -185,8 +186,8 @@ impl<'a> Labelling<'a> {
         NearRobots::find(robots, &scans, self.settings, self.attach, engine)
     }
 
-    /// Streams every input once more and writes its labels and tiles, clouds to another folder;
-    /// then what is said of robots.
+    /// Streams every input again and writes its labels and tiles, and clouds to their own folder;
+    /// then entries and files of robots.
     pub(crate) fn write<'l>(
         &'l self,
         near: &'l NearRobots,
@@ -207,8 +208,8 @@ impl<'a> Labelling<'a> {
         let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
         let mut robots = self.robot_pictures(&chosen, engine)?;
         let pack = Pack::of_clouds(&records, &export);
-        // Tiles are as many bytes as masks and clouds: each has a thread that copies them to their
-        // files.
+        // Tiles have as many bytes as masks and clouds together, so each of the two has its own
+        // writing thread.
         let apart = |strips: PipedItems<'_, LabelledStrip>| {
             for strip in strips {
                 let strip = strip?;
@@ -239,8 +240,8 @@ impl<'a> Labelling<'a> {
         Ok(Streamed { labelling: self, near, spaces, robots, open, out, done })
     }
 
-    /// Streams every input once more: into spaces, pictures of robots and tiles, and on to `hand`;
-    /// names of the plans drawn.
+    /// Streams every input again: marks spaces, draws pictures, adds records to tiles and passes
+    /// strips on to `hand`. Returns the names of the plans that were drawn.
     fn stream(
         &self,
         pass: &SecondPass<'_>,
@@ -280,7 +281,7 @@ impl<'a> Labelling<'a> {
         Ok(pictures)
     }
 
-    /// Streams an input once more; labelled strips in the order of the file.
+    /// Streams an input again and passes labelled strips on, in the order of the file.
     fn each_strip(
         &self,
         input: &Input,
@@ -293,8 +294,8 @@ impl<'a> Labelling<'a> {
         reading.each(task, label, None, engine, sink)
     }
 
-    /// The files of one robot: model, space, pictures; what is said of its space, and the pictures'
-    /// names.
+    /// Writes the files of one robot: model, space and pictures. Returns the entry of its space and
+    /// the names of the pictures.
     fn write_robot(
         &self,
         i: usize,
@@ -319,8 +320,8 @@ impl<'a> Labelling<'a> {
         LasSettings { with_color, ..LasSettings::new(self.quantum()) }
     }
 
-    /// Scale and offset of the clouds: those of a LAS input where they hold, so that its
-    /// coordinates stay what they are.
+    /// Scale and offset of the clouds: those of a LAS input where they are valid for all points, so
+    /// that its coordinates stay the same.
     fn quantum(&self) -> Quantum {
         let all = self.bounds.iter().fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
         let of_input = self.sources.las_quantum();

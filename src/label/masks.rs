@@ -1,12 +1,12 @@
-//! Strips with labels in, in the order of each file; one triple of label arrays a mask out, an
-//! entry for every point that the file does not itself flag as invalid.
+//! Writes the masks: three label arrays for each mask, in the order of the file, with an entry for
+//! every point except those that the file itself marks as invalid.
 
 use super::label_strips::LabelledStrip;
 use contract::{Error, Kind, Mask, Result};
 use export::{FileSum, LabelColumns, MaskWriter};
 use std::path::{Path, PathBuf};
 
-/// Counts of one mask.
+/// Numbers of entries of one mask.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MaskCount {
     pub(crate) n_points: u64,
@@ -17,7 +17,7 @@ pub(crate) struct MaskCount {
 /// Writes the masks of all inputs.
 pub(crate) struct Masks {
     out: PathBuf,
-    /// In the order of their numbers, which need not begin with 0.
+    /// Masks in the order of their numbers, which need not begin with 0.
     masks: Vec<Mask>,
     open: Vec<Option<Open>>,
     counts: Vec<MaskCount>,
@@ -25,10 +25,10 @@ pub(crate) struct Masks {
 
 /// A mask that is being written. Strips of several scans of one LAS file share a mask, and their
 /// places interleave within one piece of the file: labels wait in a window until a strip begins
-/// behind all of them.
+/// after all of them.
 struct Open {
     writer: MaskWriter,
-    /// Labels of the places from `writer.len()` on; what no strip named stays uncertain.
+    /// Labels of the places from `writer.len()` on; places without a point stay uncertain.
     window: LabelColumns,
     n_named: u64,
 }
@@ -43,7 +43,7 @@ impl Masks {
         }
     }
 
-    /// Takes the labels of a strip's points.
+    /// Adds the labels of a strip's points.
     pub(crate) fn add(&mut self, strip: &LabelledStrip) -> Result<()> {
         let at = (strip.mask.0 - self.masks[0].id.0) as usize;
         let slot = &mut self.open[at];
@@ -55,7 +55,7 @@ impl Masks {
         open.add(strip)
     }
 
-    /// Finishes all masks; what the file states beyond the last point is uncertain.
+    /// Finishes all masks; places that the file states after its last point become uncertain.
     pub(crate) fn finish(self) -> Result<(Vec<MaskCount>, Vec<FileSum>)> {
         let Self { out, masks, open, mut counts } = self;
         let mut digests = Vec::new();
@@ -75,7 +75,7 @@ impl Masks {
     }
 }
 
-/// Labels that are padded at a time.
+/// Number of labels that are padded at a time.
 const PAD: usize = 1 << 16;
 
 impl Open {
@@ -90,11 +90,14 @@ impl Open {
             self.flush(strip.first_place)?;
         }
         let Some(start) = strip.first_place.checked_sub(self.writer.len()) else {
-            return Err(Error::new(Kind::Bug, "a strip came after its places were written"));
+            return Err(Error::new(
+                Kind::Bug,
+                "a strip arrived after the labels of its places had been written",
+            ));
         };
         self.n_named += n as u64;
-        // Most strips have every place from their first to their last, and no other strip lies
-        // among them.
+        // Most strips have all places from their first to their last, without another strip in
+        // between.
         let is_dense = strip.place.last().is_none_or(|last| *last as usize + 1 == n);
         if is_dense && start == 0 && self.window.is_empty() {
             return self.writer.push(&strip.labels);
@@ -109,7 +112,7 @@ impl Open {
         Ok(())
     }
 
-    /// Writes the window, and uncertain labels up to `place`.
+    /// Writes the window, then uncertain labels up to `place`.
     fn flush(&mut self, place: u64) -> Result<()> {
         self.writer.push(&self.window)?;
         self.window.clear();

@@ -1,5 +1,5 @@
-//! Robots and strips in; the label of every point, as masks, clouds and pictures, and the known
-//! space around each robot, out.
+//! Labels all points of the inputs and writes masks, clouds, pictures and the known space around
+//! each robot.
 
 pub(crate) mod cluster_lookup;
 pub(crate) mod known_space;

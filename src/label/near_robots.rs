@@ -1,5 +1,5 @@
-//! Fits and the tiles near them in; the labels of the points there, by place, and what hangs on
-//! each robot out.
+//! Labels of points near the fitted robots, sorted by place, and the bodies that are attached to
+//! each robot.
 
 use crate::detect::robots::FittedRobots;
 use crate::engine::{AllThreads, Amount, Engine, Task};
@@ -9,25 +9,26 @@ use contract::{Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
 use segment::Segment;
 use std::ops::Range;
 
-/// The scans in which points near robots are looked for.
+/// Scans, robots and settings with which points near robots are labelled.
 pub(crate) struct ScansNearRobots<'a> {
     pub(crate) store: &'a Store,
     pub(crate) floor: &'a Floor,
     pub(crate) scans: &'a [Scan],
-    /// Masks of all inputs, also of those without scans here.
+    /// Number of masks of all inputs, including inputs without scans here.
     pub(crate) n_masks: usize,
 }
 
-/// What is known of points near robots.
+/// Labels of points near robots, and attached bodies.
 pub(crate) struct NearRobots {
-    /// Their labels: for each mask, by place.
+    /// Labels for each mask, sorted by place.
     pub(crate) labels: Vec<Vec<PlaceRun<Label>>>,
-    /// What hangs on each robot.
+    /// Bodies that are attached to each robot.
     pub(crate) hanging: Vec<AttachedPieces>,
 }
 
 impl NearRobots {
-    /// Segments the tiles near robots, and decides over all scans what hangs on them.
+    /// Segments the tiles near robots, and decides over all scans which bodies are attached to
+    /// them.
     pub(crate) fn find(
         robots: FittedRobots<'_>,
         scans: &ScansNearRobots<'_>,
@@ -66,22 +67,22 @@ impl NearRobots {
         Ok(Self { labels, hanging: attach::attached_pieces(&attached, fits, models) })
     }
 
-    /// The labels of one mask, for places of which many are neighbours.
+    /// Look-up of the labels of one mask, fast for neighbouring places.
     pub(crate) fn of(&self, mask: MaskId) -> NearOf<'_> {
         NearOf { runs: &self.labels[mask.0 as usize], last: 0..0, label: None }
     }
 }
 
-/// Labels of points near robots, of one mask.
+/// Look-up of labels of points near robots in one mask.
 pub(crate) struct NearOf<'a> {
     runs: &'a [PlaceRun<Label>],
-    /// Places that are labelled as the last one that was asked for.
+    /// Places with the same label as the last one that was looked up.
     last: Range<u64>,
     label: Option<Label>,
 }
 
 impl NearOf<'_> {
-    /// The label of a point near a robot.
+    /// The label of a place; `None` where its point is near no robot.
     #[inline]
     pub(crate) fn label(&mut self, place: u64) -> Option<Label> {
         if !self.last.contains(&place) {

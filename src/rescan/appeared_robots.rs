@@ -1,7 +1,7 @@
-//! Things that appeared in a cell in; the robots among them, and how they stood then where the
-//! earlier scans show them though their result missed them, out.
+//! Finds robots among the bodies that appeared in a cell. Each is also searched in the earlier
+//! scans, since a robot that the earlier result only missed did not appear.
 
-use super::robots::{Now, Observed, look};
+use super::robots::{Observed, RobotState, compare_robot};
 use super::session::{CellComparison, CellLabels, ComparedRobots, ground};
 use crate::detect::robots::{FittedRobots, RobotList};
 use crate::detect::search::Search;
@@ -16,19 +16,19 @@ use freespace::VisibilityQuery;
 use geometry::Aabb;
 use robot::Model;
 
-/// Smallest height and largest edge of a new thing that may be a robot, metres.
+/// Least height, and least longest edge, of a new body that may be a robot, metres.
 const ROBOT_LIKE: [f64; 2] = [0.4, 0.5];
-/// Room about such a thing, metres; and about one that does not stand on the floor, since the arm
-/// of a robot whose foot stood still is a thing by itself.
+/// Margin around such a body, metres; and around one that does not stand on the floor, since the
+/// arm of a robot whose foot did not move is a body by itself.
 const ABOUT: [f64; 2] = [0.3, 1.0];
-/// What moved up or down by more than this may be no thing that somebody pushed, but an arm in
-/// place of one, metres.
+/// Change of height, metres, beyond which a pair of bodies may be an arm in place of another object
+/// rather than an object that was moved.
 const LIFTED: f64 = 0.2;
-/// What begins less high above the floor stands on it, metres.
+/// Height above the floor below which a body stands on it, metres.
 const STANDS: f64 = 0.2;
 
 impl CellComparison<'_> {
-    /// Robots among the things that appeared.
+    /// Robots among the bodies that appeared.
     pub(crate) fn new_robots(
         &self,
         labels: &CellLabels,
@@ -38,7 +38,7 @@ impl CellComparison<'_> {
         let RobotList { fits, models } = plant;
         let like =
             |size: [f64; 3]| size[2] >= ROBOT_LIKE[0] && size.iter().any(|s| *s >= ROBOT_LIKE[1]);
-        // What stood elsewhere before, in the same shape and at the same height, is none.
+        // A body that stood elsewhere before, with the same shape and height, is no robot.
         let is_lifted = |thing: &&Thing| match (thing.then, thing.now) {
             (Some(then), Some(now)) => (then.min[2] - now.min[2]).abs() > LIFTED,
             (then, _) => then.is_none(),
@@ -51,7 +51,7 @@ impl CellComparison<'_> {
         if regions.is_empty() {
             return Ok(Vec::new());
         }
-        // A new one may hang on a wall.
+        // A new robot may be mounted on a wall.
         let walls = ground(self.floor, true, self.sources, self.store, self.settings, engine)?;
         let (scans, settings) = (&self.sources.scans, self.settings);
         let search = Search::new(self.library, scans, self.store, &walls, settings).over(&regions);
@@ -71,7 +71,7 @@ impl CellComparison<'_> {
         tools::attach_tools(chosen, models, &search, engine)
     }
 
-    /// Where the robot may stand that a new thing is part of.
+    /// Bounds of the robot that a new body may be part of, world frame, metres.
     fn about(&self, thing: &Aabb) -> Aabb {
         let [x, y, z] = [0, 1, 2].map(|i| 0.5 * (thing.min[i] + thing.max[i]));
         let height = self.floor.height_above([x, y, z], 0.0);
@@ -82,7 +82,7 @@ impl CellComparison<'_> {
         about
     }
 
-    /// Takes newcomers among the robots of the cell.
+    /// Adds new robots to the robots of the cell.
     pub(crate) fn join(
         &self,
         appeared: Vec<Fit>,
@@ -91,8 +91,9 @@ impl CellComparison<'_> {
         engine: &Engine,
     ) -> Result<()> {
         let RobotList { fits, models } = plant;
-        let stood = engine
-            .fan_out(Task::new("fit").large(), appeared.clone(), |fit| self.stood(&fit, models))?;
+        let stood = engine.fan_out(Task::new("fit").large(), appeared.clone(), |fit| {
+            self.earlier_fit(&fit, models)
+        })?;
         for (fit, stood) in appeared.into_iter().zip(stood) {
             robots.in_cell.push(fits.len());
             robots.changed.push(fits.len());
@@ -109,9 +110,9 @@ impl CellComparison<'_> {
         Ok(())
     }
 
-    /// How a robot that the earlier result does not have stood then, if its scans show it, too: it
-    /// did not appear.
-    fn stood(&self, now: &Fit, models: &[Model]) -> Result<Option<(Fit, Option<Model>)>> {
+    /// The earlier posture of a robot that the earlier result does not have, if its scans show it;
+    /// such a robot did not appear.
+    fn earlier_fit(&self, now: &Fit, models: &[Model]) -> Result<Option<(Fit, Option<Model>)>> {
         let search = Search::new(
             self.library,
             &self.sources.scans,
@@ -121,14 +122,14 @@ impl CellComparison<'_> {
         );
         let (watch, other) = (VisibilityQuery::new(&self.cell, &self.old_views), self.watch());
         let seen = Observed { search: &search, watch: &watch, other_session: &other, regions: &[] };
-        let (then, own) = look(now, models, &seen)?;
+        let (then, own) = compare_robot(now, models, &seen)?;
         Ok(match then {
-            Now::Found(fit) | Now::Anew(fit, _) => Some((*fit, own)),
-            Now::Gone | Now::Unseen | Now::Open | Now::Lost => None,
+            RobotState::Found(fit) | RobotState::Anew(fit, _) => Some((*fit, own)),
+            RobotState::Gone | RobotState::Unseen | RobotState::Open | RobotState::Lost => None,
         })
     }
 
-    /// Labels of points of the earlier scans on robots that their result missed; nothing where it
+    /// Labels of points of the earlier scans on robots that their result missed; `None` where it
     /// missed none.
     pub(crate) fn missed(
         &self,

@@ -1,5 +1,5 @@
-//! Points of earlier scans in a cell in; the surfaces that they lie on, what the new scans say of
-//! each of them, and which of them are superseded, out.
+//! Points of earlier scans in a cell: the surfaces that they lie on, how the new scans see each of
+//! them, and which of them are superseded.
 
 use super::earlier_result::EarlierResult;
 use super::superseded::Places;
@@ -15,49 +15,50 @@ use geometry::{Aabb, Point};
 use register::SurfaceVoxels;
 use std::collections::BTreeSet;
 
-/// One of so many points tells the surfaces, and of many points more are passed over, so that about
-/// so many do: a tenth of a voxel's points is enough for its plane.
+/// One of so many points is used for the surfaces, since a tenth of a voxel's points is enough for
+/// its plane; of dense tiles fewer are read.
 const SAMPLE: u64 = 5;
 const N_SAMPLED: u64 = 2_000_000;
-/// Places so far apart are read from the mask one after the other.
+/// Distance of places in a mask beyond which they are read separately.
 const GAP: u64 = 1 << 14;
 
-/// Masks are read through where at least one place in so many is asked for.
+/// Share of requested places, as one in so many, from which on a mask is read sequentially.
 const SPARSE: u64 = 64;
 
-/// Earlier points in a cell.
+/// Points of the earlier scans in a cell.
 pub(crate) struct EarlierPoints<'a> {
     pub(crate) scans: &'a [Scan],
     pub(crate) store: &'a Store,
     pub(crate) cell: Aabb,
     base: &'a EarlierResult,
     masks: Vec<MaskReader>,
-    /// By mask: places that were superseded before, and how many points it has.
+    /// For each mask, places that were superseded before, and its number of points.
     before: Vec<Vec<u64>>,
     n_points: Vec<u64>,
     tiles: Vec<usize>,
 }
 
-/// What the new scans say of the earlier points.
-pub(crate) struct Compared {
-    /// What stood there, by voxel.
+/// The earlier points as the new scans see them.
+pub(crate) struct ComparedPoints {
+    /// Occupancy of the earlier session, by voxel.
     pub(crate) then: SessionOccupancy,
-    tiles: Vec<Looked>,
-    /// What becomes of them.
+    tiles: Vec<LookedUpTile>,
+    /// Fates of the points, by voxel.
     pub(crate) fates: Fates,
-    /// By mask: places where they saw a surface: it was measured anew.
+    /// For each mask, places whose surface the new scans measured again.
     anew: Vec<Places>,
 }
 
-/// What the new scans say of the points of one tile.
+/// The points of one tile as the new scans see them.
 #[derive(Default)]
-struct Looked {
+struct LookedUpTile {
     mask: u32,
-    /// Places that their beams went through, with their voxels.
+    /// Places that new beams passed through, with their voxels.
     through: Vec<(u64, [i32; 3])>,
-    /// Places that belong to robots.
+    /// Places of robot points, with the robots' numbers.
     robots: Vec<(u64, i16)>,
-    /// Voxels of robots that the earlier result missed.
+    /// Voxels of robots that the earlier result missed: where new beams pass through them, the
+    /// points are gone.
     missed: BTreeSet<[i32; 3]>,
     tally: SessionOccupancy,
 }
@@ -74,12 +75,12 @@ impl<'a> EarlierPoints<'a> {
         Ok(Self { scans, store, cell, base, masks, before, n_points, tiles: store.touching(&cell) })
     }
 
-    /// The same with another cell.
+    /// The same points for another cell.
     pub(crate) fn of_cell(self, cell: Aabb) -> Self {
         Self { cell, tiles: self.store.touching(&cell), ..self }
     }
 
-    /// The surfaces of what stood there.
+    /// Surfaces of the earlier points.
     pub(crate) fn surfaces(&self, engine: &Engine) -> Result<SurfaceVoxels> {
         let (skip, step) = sampled((self.n_points() / N_SAMPLED).max(SAMPLE));
         let (mut all, sample) = (SurfaceVoxels::default(), Sample { past: self, step });
@@ -94,17 +95,18 @@ impl<'a> EarlierPoints<'a> {
         Ok(all)
     }
 
-    /// Asks the new scans about every point, and the earlier ones where those saw nothing.
-    pub(crate) fn look(
+    /// Looks up every point in the new scans; where those saw nothing, in the earlier ones.
+    pub(crate) fn look_up(
         &self,
         [watch, own]: [&VisibilityQuery<'_>; 2],
         missed: Option<&NearRobots>,
         engine: &Engine,
-    ) -> Result<Compared> {
+    ) -> Result<ComparedPoints> {
         let (mut then, mut tiles) = (SessionOccupancy::default(), Vec::new());
         let fates = Fates::of(&self.cell);
         let anew: Vec<Places> = self.n_points.iter().map(|n| Places::of(*n)).collect();
-        let look = Look { past: self, watch, own, missed, fates: &fates, anew: &anew };
+        let look =
+            EarlierPointLookUp { past: self, watch, own, missed, fates: &fates, anew: &anew };
         let source = self.store.picks_once(self.tiles.clone(), 0);
         let reads = self.store.reads();
         engine.pass(self.task("compare"), source, |f| {
@@ -114,14 +116,14 @@ impl<'a> EarlierPoints<'a> {
                 Ok(())
             })
         })?;
-        Ok(Compared { then, tiles, fates, anew })
+        Ok(ComparedPoints { then, tiles, fates, anew })
     }
 
-    /// All places that are superseded now, by mask: those that were before, those that were
-    /// measured anew, those of things that are gone, and those of robots that stand otherwise.
+    /// All superseded places, by mask: those superseded before, measured again, of bodies that are
+    /// gone, and of robots that have moved.
     pub(crate) fn superseded<'c>(
         &self,
-        compared: &'c Compared,
+        compared: &'c ComparedPoints,
         gone: &BTreeSet<[i32; 3]>,
         stands_otherwise: impl Fn(i16) -> bool,
     ) -> &'c [Places] {
@@ -142,7 +144,7 @@ impl<'a> EarlierPoints<'a> {
 
     /// Voxels of robots that the earlier result missed: what the new scans see through of them is
     /// gone.
-    pub(crate) fn missed(compared: &Compared) -> impl Iterator<Item = &[i32; 3]> {
+    pub(crate) fn missed(compared: &ComparedPoints) -> impl Iterator<Item = &[i32; 3]> {
         compared.tiles.iter().flat_map(|tile| &tile.missed)
     }
 
@@ -151,17 +153,17 @@ impl<'a> EarlierPoints<'a> {
         self.before[mask.0 as usize].binary_search(&place).is_ok()
     }
 
-    /// How many of one mask were superseded before.
+    /// Number of places of one mask that were superseded before.
     pub(crate) fn n_of(&self, mask: usize) -> usize {
         self.before[mask].len()
     }
 
-    /// How many were superseded before.
+    /// Number of places that were superseded before.
     pub(crate) fn n_before(&self) -> u64 {
         self.before.iter().map(|places| places.len() as u64).sum()
     }
 
-    /// Points of the tiles that the cell touches.
+    /// Number of points of the tiles that the cell touches.
     fn n_points(&self) -> u64 {
         self.tiles.iter().map(|&i| self.store.entries()[i].n_points).sum()
     }
@@ -209,8 +211,8 @@ impl<'a> EarlierPoints<'a> {
     }
 }
 
-/// How one of so many points is read: what is left out of each tile (see [`Tile::skip`]), and one
-/// of how many of the others.
+/// How to read one of `of` points: the `skip` of each tile (see [`Tile::skip`]), and the step
+/// through the remaining points.
 pub(crate) fn sampled(of: u64) -> (u32, usize) {
     let skip = (of.max(1).ilog2() / 2).min(MAX_SKIP);
     (skip, (of >> (2 * skip)) as usize)
@@ -245,21 +247,21 @@ impl Map for Sample<'_> {
     }
 }
 
-/// The points of a tile that are asked for; kept from tile to tile, since fresh memory costs more
-/// than what is done with it.
+/// Points of a tile that are looked up; kept from tile to tile, since fresh memory costs more time
+/// than the look-up.
 #[derive(Default)]
-struct Asked {
+struct PointsToLookUp {
     places: Vec<u64>,
     worlds: Vec<[f64; 3]>,
     labels: Vec<Label>,
     sights: Vec<Visibility>,
 }
 
-/// The map that asks the new scans.
-struct Look<'a> {
+/// The map that looks up points in the new scans.
+struct EarlierPointLookUp<'a> {
     past: &'a EarlierPoints<'a>,
     watch: &'a VisibilityQuery<'a>,
-    /// Of the earlier scans.
+    /// Look-up in the earlier scans.
     own: &'a VisibilityQuery<'a>,
     /// Labels of robots that the earlier result missed.
     missed: Option<&'a NearRobots>,
@@ -267,16 +269,16 @@ struct Look<'a> {
     anew: &'a [Places],
 }
 
-impl Map for Look<'_> {
+impl Map for EarlierPointLookUp<'_> {
     type In = Tile;
-    type Out = Looked;
-    type Scratch = Asked;
+    type Out = LookedUpTile;
+    type Scratch = PointsToLookUp;
 
-    fn apply(&self, tile: Tile, asked: &mut Asked) -> Result<Looked> {
+    fn apply(&self, tile: Tile, asked: &mut PointsToLookUp) -> Result<LookedUpTile> {
         let (scan, mask) = self.past.scan(&tile);
         let old = &self.past.before[mask.0 as usize];
         let is_new = |place: u64| old.is_empty() || old.binary_search(&place).is_err();
-        let Asked { places, worlds, labels, sights } = asked;
+        let PointsToLookUp { places, worlds, labels, sights } = asked;
         places.clear();
         worlds.clear();
         let in_world = World::from(scan);
@@ -289,7 +291,7 @@ impl Map for Look<'_> {
         }
         self.past.labels(mask, places, labels)?;
         self.watch.look_all(worlds, sights);
-        let mut out = Looked { mask: mask.0, ..Looked::default() };
+        let mut out = LookedUpTile { mask: mask.0, ..LookedUpTile::default() };
         let mut tallying = OccupancyBuilder::default();
         let mut anew = self.anew[mask.0 as usize].adding();
         let mut missed = self.missed.map(|near| near.of(mask));
@@ -324,8 +326,8 @@ impl Map for Look<'_> {
     }
 }
 
-/// What a session has at the place of another one's point, of which that one's own beams say
-/// whether it is of a mesh.
+/// Visibility of a point of one session in the scans of the other; the beams of its own session
+/// tell whether it belongs to a mesh or fence.
 pub(crate) fn seen(
     sight: Visibility,
     own: &VisibilityQuery<'_>,
@@ -338,17 +340,17 @@ pub(crate) fn seen(
     }
 }
 
-/// Area across its beam that a point stands for, m²: that of its pixel, or of a voxel's share where
-/// no scanner is known.
+/// Area across its beam that a point represents, m²: that of its pixel, or the share of a voxel
+/// where no scanner is known.
 pub(crate) fn area(scan: &Scan, world: [f64; 3]) -> f64 {
     let Some(lattice) = &scan.lattice else { return SessionOccupancy::FACE };
     let beam = Point::from(world) - Point::from(scan.world_from_scan.translation.vector);
     lattice.row_step * lattice.col_step * beam.norm_squared()
 }
 
-/// Points of a scan in the world.
+/// Transformation of a scan's points to the world frame.
 pub(crate) struct World {
-    /// Rotation, by row.
+    /// Rotation matrix, by row.
     rotation: [[f64; 3]; 3],
     shift: [f64; 3],
 }
@@ -360,7 +362,7 @@ impl World {
         Self { rotation: rotation.into(), shift: pose.translation.vector.into() }
     }
 
-    /// A point of the scan in the world, metres.
+    /// World coordinates of a point of the scan, metres.
     #[inline]
     pub(crate) fn of(&self, [x, y, z]: [f32; 3]) -> [f64; 3] {
         let ([x, y, z], Self { rotation: r, shift }) =
@@ -380,7 +382,7 @@ impl Weigh for Sampled {
     }
 }
 
-impl Weigh for Looked {
+impl Weigh for LookedUpTile {
     fn weight_bytes(&self) -> usize {
         size_of_val(&*self.through) + size_of_val(&*self.robots)
     }

@@ -1,5 +1,5 @@
-//! The result that a rescan goes on from: its folder in; what it found, and its files shared with
-//! the new result, out.
+//! The result that a rescan starts from: its robots, tiles and masks, and its files, which are
+//! shared with the new result.
 
 use crate::cache::{Key, OutputDir, OutputFile, VerifiedFiles, tiles_of};
 use crate::job::Job;
@@ -10,37 +10,39 @@ use export::{MaskReader, ResultFile, ScanLabels, read_places};
 use geometry::Aabb;
 use std::path::{Path, PathBuf};
 
-/// An earlier result that is whole.
+/// A complete earlier result.
 pub(crate) struct EarlierResult {
     pub(crate) out: PathBuf,
     pub(crate) result: ResultFile,
     pub(crate) state: PlantState,
-    /// Its files: what is read of them is compared with its list.
+    /// Its files; each is compared with the manifest when it is read.
     pub(crate) files: VerifiedFiles,
-    /// Nobody rewrites it meanwhile.
+    /// Lock that keeps other runs from rewriting it.
     _lock: std::fs::File,
 }
 
 impl EarlierResult {
-    /// Reads what a result says of itself.
+    /// Opens a result.
     ///
     /// # Errors
-    /// No result, or one without its store.
+    /// There is no result, or its store is missing.
     pub(crate) fn open(out: &Path) -> Result<Self> {
-        // A folder without a list is no result; one without its store is a result that cannot be
-        // gone on from.
+        // This distinguishes a folder without a manifest, which is no result, from a result without
+        // its store.
         drop(VerifiedFiles::open(out)?);
         let lock = Job::hold_shared(out)?;
-        // Once more, since another run may have ended there meanwhile.
+        // The manifest is read again under the lock, since another run may have ended meanwhile.
         let files = VerifiedFiles::open(out)?;
         let (result, state) = (files.result()?, PlantState::read(&files)?);
         let base = Self { out: out.to_path_buf(), result, state, files, _lock: lock };
         for key in &base.state.tiles {
             let folder = base.tiles_folder().join(key.name());
             if !folder.is_dir() {
-                return Err(Error::bad_input("the tiles of the earlier result are not there")
-                    .at(folder.display())
-                    .hint("run the whole plant again: its store was taken away"));
+                return Err(Error::bad_input(
+                    "the store with the tiles of the earlier result is missing",
+                )
+                .at(folder.display())
+                .hint("run the whole plant again to make the store"));
             }
         }
         Ok(base)
@@ -50,24 +52,24 @@ impl EarlierResult {
         self.out.join("store").join("tiles")
     }
 
-    /// Makes its tiles and loaded models those of a new result, too.
+    /// Shares its tiles and loaded models with a new result.
     pub(crate) fn share_store(&self, output: &OutputDir) -> Result<()> {
         for key in &self.state.tiles {
             let (from, to) =
                 (self.tiles_folder().join(key.name()), output.tiles().join(key.name()));
-            // Also where they are there already: they may be what an earlier attempt met damaged.
+            // Existing files are replaced: an earlier attempt may have found them damaged.
             share_folder(&from, &to)?;
         }
         share_folder(&self.out.join("store").join("models"), &output.models())
     }
 
-    /// The store of its scans, as it lies with a new result.
+    /// The store of its scans, opened in the folder of a new result.
     pub(crate) fn store(&self, output: &OutputDir, resident_bytes: usize) -> Result<Store> {
         let open = |(input, key): (usize, &Key)| {
             let place = output.tiles().join(key.name());
             let mut store = Store::open(&place, self.state.first_scan(input), resident_bytes)?;
-            // Its tiles are compared with its catalogue while they are read, and the catalogue here
-            // with what the run kept.
+            // Tiles are compared with the catalogue when they are read, and the catalogue with the
+            // digest that the run has recorded.
             if store.contents().first() != self.state.contents.get(input) {
                 let what = "the tiles in the store are not those of the earlier result";
                 let folder = self.tiles_folder().join(key.name());
@@ -82,8 +84,8 @@ impl EarlierResult {
         Ok(Store::join(stores?))
     }
 
-    /// Gives the new result the files of this one but those that `is_new` says are made anew;
-    /// returns them as they are listed.
+    /// Shares its files with the new result, except those for which `is_new` is true; returns their
+    /// entries of the manifest.
     pub(crate) fn share_files(
         &self,
         next: &Path,
@@ -92,8 +94,8 @@ impl EarlierResult {
         let stay: Vec<OutputFile> =
             self.listed().iter().filter(|file| !is_new(&file.path)).cloned().collect();
         for file in &stay {
-            // What is not read is not compared: its digest is handed on, and `verify` finds what
-            // was changed of it.
+            // Files that are not read are not compared: their digests are passed on, and `verify`
+            // finds changes.
             share(&self.files.path(&file.path)?, &next.join(&file.path))?;
         }
         Ok(stay)
@@ -104,18 +106,19 @@ impl EarlierResult {
         self.files.has(path)
     }
 
-    /// All of its files.
+    /// Entries of all of its files.
     pub(crate) fn listed(&self) -> &[OutputFile] {
         &self.files.manifest().files
     }
 
-    /// Names of its spatial tiles that some boxes touch, relative to its folder.
+    /// Names of its spatial tiles that some boxes touch (world frame, metres), relative to its
+    /// folder.
     pub(crate) fn tiles(&self, touched: &[&Aabb]) -> Vec<String> {
         let edge = self.state.records.tile_edge();
         edge.map_or_else(Vec::new, |edge| tiles_of(self.listed(), edge, touched))
     }
 
-    /// Compares the files of one of its masks with its list, each once.
+    /// Compares the files of one mask with the manifest, each once.
     pub(crate) fn compare_mask(&self, mask: usize) -> Result<()> {
         let files = &self.result.labels.scans[mask];
         [&files.kind, &files.robot, &files.link]
@@ -123,13 +126,13 @@ impl EarlierResult {
             .try_for_each(|name| self.files.compared(name).map(drop))
     }
 
-    /// Reads labels of each of its masks, once that was compared.
+    /// Readers of its masks; each mask is compared before it is read.
     pub(crate) fn masks(&self) -> Vec<MaskReader> {
         let reader = |s: &ScanLabels| MaskReader::new(&self.out, [&s.kind, &s.robot, &s.link]);
         self.result.labels.scans.iter().map(reader).collect()
     }
 
-    /// Places of each mask that were superseded before, ascending.
+    /// Superseded places of each mask, ascending.
     pub(crate) fn superseded(&self) -> Result<Vec<Vec<u64>>> {
         let read = |s: &ScanLabels| {
             let file = s.superseded.as_ref();
@@ -139,7 +142,7 @@ impl EarlierResult {
     }
 }
 
-/// Every file of a folder under a second name; links where the system has them.
+/// Shares every file of a folder as hard links where the system supports them.
 fn share_folder(from: &Path, to: &Path) -> Result<()> {
     let failed = |e: std::io::Error| Error::from(e).at(from.display());
     for entry in std::fs::read_dir(from).map_err(failed)? {
@@ -151,8 +154,8 @@ fn share_folder(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A file under a second name: nobody writes to it under either, so it takes no room twice. A copy
-/// where the two lie on different disks.
+/// Shares a file as a hard link, which takes no space: nobody writes to it under either name. On
+/// another disk it is copied.
 fn share(from: &Path, to: &Path) -> Result<()> {
     let made = to.parent().map_or(Ok(()), std::fs::create_dir_all);
     let _ = std::fs::remove_file(to);
@@ -163,6 +166,6 @@ fn share(from: &Path, to: &Path) -> Result<()> {
         Error::new(Kind::Io, "a file of the earlier result cannot be shared")
             .because(e)
             .at(from.display())
-            .hint("`stillpoint verify` tells whether the earlier result is whole")
+            .hint("`stillpoint verify` tells whether the earlier result is complete")
     })
 }

@@ -1,4 +1,4 @@
-//! All that a rescan has found, for those that write it.
+//! All findings of a rescan, for the modules that write them.
 
 use super::earlier_result::EarlierResult;
 use super::frame::CarriedSession;
@@ -6,8 +6,9 @@ use super::session::{CellComparison, CellLabels, ComparedRobots};
 use contract::Fit;
 use robot::Model;
 
-/// The earlier result, what both sessions saw of the cell, and how its robots stand now.
-pub(crate) struct Found<'a, 's> {
+/// The earlier result, the comparison of both sessions in the cell, and the robots as they stand
+/// now.
+pub(crate) struct RescanFindings<'a, 's> {
     pub(crate) base: &'a EarlierResult,
     pub(crate) session: &'a CellComparison<'s>,
     pub(crate) robots: &'a ComparedRobots,

@@ -1,6 +1,5 @@
-//! The earlier session and new scans in; which frame the new scans are in, found by surfaces and
-//! beams of both where it is not that of the plant, out: the scans and their tiles are carried into
-//! the plant.
+//! Finds the frame of the new scans from surfaces and beams of both sessions, unless it is that of
+//! the plant, and carries scans and tiles to the plant's frame.
 
 use super::earlier_points::{EarlierPoints, World};
 use crate::engine::{AllThreads, Engine, Task};
@@ -12,46 +11,45 @@ use geometry::{Aabb, Point, Pose, Vector};
 use ingest::Sources;
 use nalgebra::{Translation3, UnitQuaternion};
 
-/// What is said of the frame of new scans.
+/// What the user states about the frame of the new scans.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Frame {
-    /// Nothing: it is the plant's, unless surfaces say otherwise.
+    /// Nothing: the frame is that of the plant unless surfaces contradict it.
     #[default]
     Find,
-    /// It is the plant's.
+    /// The frame is that of the plant.
     Stated,
-    /// About where the first new scanner stands in the plant, metres, and by how much the new frame
-    /// is turned to be the plant's, degrees.
+    /// Approximate position of the first new scanner in the plant, metres, and turn from the new
+    /// frame to that of the plant, degrees.
     Rough([f64; 4]),
 }
 
-/// Where the new scans lie.
+/// The frame of the new scans.
 #[derive(Default)]
 pub(crate) struct CarriedSession {
-    /// The plant's frame from theirs; none where it is theirs, too.
+    /// Pose that carries the new scans to the plant's frame; `None` where they are in it.
     pub(crate) plant_from_new: Option<Pose>,
-    /// The same with what speaks for it.
+    /// The entry of that pose in the result, with its evidence.
     pub(crate) entry: Option<CarriedEntry>,
-    /// What is odd about it.
+    /// Warnings about the frame.
     pub(crate) warnings: Vec<String>,
 }
 
-/// Angle between beams that are looked at, radians, at most: 0.25°; of a plant with many scans
-/// more.
+/// Greatest angle between beams that are used, radians (0.25°); larger for a plant with many scans.
 const STEP: f64 = 0.004_36;
 const MANY_SCANS: f64 = 16.0;
-/// Points of a scan without a raster that are looked at, about.
+/// Approximate number of points that are used of a scan without a raster.
 const N_LOOSE: u64 = 1_000_000;
-/// Earlier scans whose beams are asked about the stated frame.
+/// Most earlier scans whose beams are compared with the stated frame.
 const MAX_ASKED: usize = 8;
-/// Room about the new scans in which the earlier session is looked at for that, metres.
+/// Margin around the new scans within which the earlier session is compared, metres.
 const ROOM: f64 = 1.0;
 
-/// Finds the frame of the new scans, and carries them and their tiles into that of the plant;
-/// `stood` are the bounds of robots as they stood, world, metres.
+/// Finds the frame of the new scans, and carries them and their tiles to that of the plant. `stood`
+/// are bounds of the robots in their earlier postures, world frame, metres.
 ///
 /// # Errors
-/// `BadInput` where no frame is clear, or the given one is contradicted.
+/// `BadInput` where no frame is unambiguous, or surfaces contradict the stated one.
 pub(crate) fn carry(
     wish: &Frame,
     past: &EarlierPoints<'_>,
@@ -70,14 +68,14 @@ pub(crate) fn carry(
     Ok(carried)
 }
 
-/// What both sessions saw.
+/// Surfaces of both sessions.
 #[derive(Clone, Copy)]
 struct BothSessions<'s> {
     old: &'s SessionSurfaces,
     new: &'s SessionSurfaces,
 }
 
-/// All that the frame is found from.
+/// Scans, stores and settings with which the frame is found.
 struct FrameSearch<'a> {
     past: &'a EarlierPoints<'a>,
     stood: Vec<Aabb>,
@@ -119,7 +117,7 @@ impl FrameSearch<'_> {
         }
     }
 
-    /// The word of a person that the frame is the plant's: believed unless surfaces and beams
+    /// Accepts the user's statement that the frame is that of the plant, unless surfaces and beams
     /// contradict it.
     fn as_stated(&self, answer: Answer, both: BothSessions<'_>) -> Result<CarriedSession> {
         let warning = "too few surfaces of the new scans lie on the plant's to confirm the frame that --frame states";
@@ -152,16 +150,16 @@ impl FrameSearch<'_> {
         }
     }
 
-    /// The plant's frame from the new one, by the place of the first new scanner and a turn in
-    /// degrees.
+    /// Pose of the new frame in the plant, from the position of the first new scanner (metres) and
+    /// a turn in degrees.
     fn posed(&self, [x, y, z, yaw]: [f64; 4]) -> Pose {
         let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw.to_radians());
         let shift = Vector::new(x, y, z) - turn * self.first();
         Pose::from_parts(Translation3::from(shift), turn)
     }
 
-    /// Where the first new scanner stands in the new frame; the middle of its points where that is
-    /// not known.
+    /// Position of the first new scanner in the new frame; the middle of its points where it is
+    /// unknown.
     fn first(&self) -> Vector {
         let scans = self.scans();
         scans.first().map_or_else(Vector::zeros, |scan| scan.world_from_scan.translation.vector)
@@ -187,7 +185,7 @@ impl FrameSearch<'_> {
         gather.session(self.scans(), all, &[], usize::MAX, self.engine)
     }
 
-    /// The earlier session, whole or as far as it lies within some bounds.
+    /// Surfaces of the earlier session, all or those within some bounds.
     fn old_session(&self, bounds: Option<&Aabb>) -> Result<SessionSurfaces> {
         let store = self.past.store;
         let tiles = match bounds {
@@ -238,7 +236,7 @@ impl FrameSearch<'_> {
         )
     }
 
-    /// A place as the flag that states it.
+    /// The `--frame` flag that states this pose.
     fn flag(&self, place: &FramePlace, both: BothSessions<'_>) -> String {
         let BothSessions { old, new } = both;
         let pose = world(&place.laid.old_from_new, old, new);
@@ -249,12 +247,12 @@ impl FrameSearch<'_> {
     }
 }
 
-/// Whether beams went through more than what agrees.
+/// Whether beams passed through more surface than agrees.
 fn is_contradicted(place: &FramePlace) -> bool {
     place.evidence.n_against() > place.evidence.n_same()
 }
 
-/// What speaks for and against a place.
+/// The evidence for and against a pose, as text.
 fn in_words(place: &FramePlace) -> String {
     let e = &place.evidence;
     format!(
@@ -264,7 +262,7 @@ fn in_words(place: &FramePlace) -> String {
     )
 }
 
-/// Poses between worlds as poses between origins of sessions, and back.
+/// Converts poses between world frames to poses between the origins of sessions, and back.
 fn local(plant_from_new: &Pose, old: &SessionSurfaces, new: &SessionSurfaces) -> Pose {
     Translation3::from(-old.surfels.origin)
         * plant_from_new
@@ -295,13 +293,13 @@ fn carried(place: &FramePlace, by: &str, both: BothSessions<'_>) -> CarriedSessi
     CarriedSession { plant_from_new: Some(pose), entry: Some(entry), warnings: Vec::new() }
 }
 
-/// Reads a session.
+/// Reads the surfaces of a session.
 struct SessionReader<'a> {
     store: &'a Store,
     origin: Vector,
-    /// Whose superseded points are left out.
+    /// Superseded points, which are left out.
     superseded: Option<&'a EarlierPoints<'a>>,
-    /// Surfaces outside are left out, world, metres.
+    /// Bounds outside of which surfaces are left out, world frame, metres.
     bounds: Option<&'a Aabb>,
 }
 
@@ -315,7 +313,7 @@ impl SessionReader<'_> {
         engine: &Engine,
     ) -> Result<SessionSurfaces> {
         let entries = self.store.entries();
-        // Of each scan: its tiles here, and how many points these have.
+        // For each scan, its tiles in the bounds and their number of points.
         let mut own: Vec<(&Scan, Vec<usize>, u64)> =
             scans.iter().map(|scan| (scan, Vec::new(), 0)).collect();
         let first = scans.first().map_or(0, |scan| scan.id.0);
@@ -331,7 +329,7 @@ impl SessionReader<'_> {
         let step = STEP * (own.len() as f64 / MANY_SCANS).sqrt().max(1.0);
         let mut all = Gathered::about(self.origin);
         let mut eyes = Vec::new();
-        // Few scans at a time: what each of them adds is kept until it is joined to the rest.
+        // Few scans are read at a time, since the surfaces of each are kept until they are merged.
         let work: Vec<_> = own.iter().enumerate().collect();
         for some in work.chunks(2 * engine.n_workers) {
             let read =
@@ -346,7 +344,7 @@ impl SessionReader<'_> {
         Ok(SessionSurfaces { surfels: all.surfels(robots), eyes })
     }
 
-    /// One scan: its surfaces, and how far its beams went if that is asked for.
+    /// Surfaces of one scan, and on request the ranges of its beams.
     fn scan(
         &self,
         scan: &Scan,

@@ -1,8 +1,8 @@
-//! Spaces of robots as the earlier result has them, and what the new scans saw, in; spaces in and
-//! beside the cell, brought up to date, out. Points are marked into them while they are labelled
-//! and while tiles are written.
+//! Known space around robots after a rescan: spaces of the earlier result, brought up to date
+//! within the cell by the new scans. Points are marked in them while they are labelled and tiles
+//! are written.
 
-use super::found::Found;
+use super::found::RescanFindings;
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
 use crate::engine::{Engine, Task};
@@ -13,9 +13,9 @@ use freespace::PassedVoxels;
 use geometry::Aabb;
 use std::path::Path;
 
-impl Found<'_, '_> {
-    /// By fit: spaces of robots that stand otherwise, and of others that reach to where points are
-    /// looked at again.
+impl RescanFindings<'_, '_> {
+    /// For each fit, the space of a robot that has moved, or whose space reaches places with
+    /// compared points.
     pub(super) fn spaces(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
         let mut out: Vec<Option<Space>> = vec![None; self.fits.len()];
         let settings = self.session.settings;
@@ -40,7 +40,7 @@ impl Found<'_, '_> {
         Ok(out)
     }
 
-    /// The space of one robot; points of the places are still to be marked.
+    /// The space of one robot, before points of the places are marked.
     fn space(
         &self,
         i: usize,
@@ -60,11 +60,11 @@ impl Found<'_, '_> {
         let grid = SpaceGrid::over(&reach, edge);
         let Some(old) = old.filter(|_| !places.is_empty()) else {
             let mut seen = around.seen(i, grid)?;
-            seen.iter_mut().for_each(|space| around.stand(space, i));
+            seen.iter_mut().for_each(|space| around.fill_robots(space, i));
             return Ok(seen);
         };
         let mut space = Space::unknown(grid);
-        around.stand(&mut space, i);
+        around.fill_robots(&mut space, i);
         let model = &self.models[fit.model];
         let passed = PassedVoxels::new(&self.session.cell, &self.session.new_views, grid.edge)
             .about(model, &poses(fit, model));
@@ -72,7 +72,7 @@ impl Found<'_, '_> {
         Ok(Some(space))
     }
 
-    /// Marks what is left of the old points and writes them; by fit, what is said of them.
+    /// Marks the remaining old points and writes the spaces; returns the entry of each fit.
     pub(super) fn write_spaces(
         &self,
         mut spaces: Vec<Option<Space>>,
@@ -86,23 +86,22 @@ impl Found<'_, '_> {
         })
     }
 
-    /// Where points of the earlier result are looked at again, one by one: the cell, and where
-    /// robots stood. Nowhere, where it has no tiles of them.
+    /// Bounds within which points of the earlier result are compared one by one: the cell, and the
+    /// earlier postures of robots. Empty where the result has no tiles.
     fn places(&self) -> Vec<Aabb> {
         let has_tiles = self.base.state.records.tile_edge().is_some();
         let places = self.robots.left.iter().chain([&self.session.past.cell]);
         places.filter(|_| has_tiles).copied().collect()
     }
 
-    /// What the earlier result says of the space of a robot.
+    /// The earlier result's entry of a robot's space.
     fn entry(&self, robot: usize) -> Option<&SpaceEntry> {
         self.base.result.robots.get(robot)?.space.as_ref()
     }
 }
 
-/// Adds to a space that robots fill what is seen within some places, and what was known elsewhere.
-/// Which points the places hold is not known yet; what was seen free and is not seen now stays
-/// free.
+/// Completes a space that robots fill already: within `places` by new beams, elsewhere by the
+/// earlier space. Points are marked later; a voxel that was free and is not seen now stays free.
 fn renew(space: &mut Space, old: &Space, places: &[Aabb], is_free: impl Fn([f64; 3]) -> bool) {
     use SpaceKind::{Fixed, Free, Other, Robot, Unknown};
     let grid = *space.grid();
@@ -138,7 +137,7 @@ mod tests {
     #[test]
     fn voxels_are_renewed_where_points_are_looked_at_again_and_nowhere_else() {
         use SpaceKind::{Fixed, Free, Other, Robot, Unknown};
-        // The place ends within the third voxel: that is not all looked at.
+        // The place ends within the third voxel, which is therefore not covered as a whole.
         let place = Aabb { min: [-0.01; 3], max: [0.25, 0.11, 0.11] };
         let after = |was, free: [bool; 4], bodies| {
             let (mut space, old) = (space(bodies), space(was));
@@ -152,7 +151,7 @@ mod tests {
         assert_eq!(after([Free; 4], unseen, bodies), [Free, Other, Free, Robot]);
         let was = [Robot, Other, Robot, Fixed];
         assert_eq!(after(was, unseen, bodies), [Unknown, Other, Robot, Fixed]);
-        // A robot is where it stands, whatever beams are said to have gone through it.
+        // The voxels of a robot stay filled whatever beams have passed through them.
         assert_eq!(after([Unknown; 4], [true; 4], bodies), [Free, Other, Unknown, Robot]);
     }
 }

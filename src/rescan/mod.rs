@@ -1,5 +1,5 @@
-//! One cell of a plant scanned again: an earlier result and new scans in; the same result with that
-//! cell brought up to date, and what changed, out. What the new scans do not touch is shared with
+//! Brings one cell of a plant up to date: from an earlier result and new scans of the cell to a
+//! complete result and a list of changes. Files that the new scans do not affect are shared with
 //! the earlier result, byte for byte.
 
 mod appeared_robots;
@@ -33,47 +33,47 @@ use crate::store::Store;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
 use earlier_points::EarlierPoints;
 use earlier_result::EarlierResult;
-use found::Found;
+use found::RescanFindings;
 use geometry::{Aabb, Pose};
 use ingest::{KnownScanners, Sources};
 use robot::Library;
 use session::{BothScans, CellComparison, ComparedRobots};
 use std::path::PathBuf;
 
-/// What is to be done.
+/// Request of a rescan.
 #[derive(Debug, Clone)]
 pub struct RescanRequest {
-    /// Output folder of the result that is gone on from.
+    /// Output folder of the earlier result.
     pub base: PathBuf,
-    /// Which part of the plant.
+    /// The part of the plant that was scanned again.
     pub cell: Cell,
-    /// Which frame the new scans are in.
+    /// The frame of the new scans.
     pub frame: Frame,
-    /// The new scans, where the result goes, and the means; the library is that of the base where
-    /// its path is empty.
+    /// New scans, output folder, memory, threads and settings; an empty library path means the
+    /// library of the earlier result.
     pub job: Job,
 }
 
 /// Brings a cell up to date.
 ///
 /// # Errors
-/// A base that is no whole result, an input that is part of it already; what a run may end with.
+/// `base` is not a complete result, an input is part of it already, or an error of a run.
 pub fn rescan(request: &RescanRequest, engine: &Engine) -> Result<Outcome> {
     let base = EarlierResult::open(&request.base)?;
     let job = job(request, &base)?;
     let output = job.output()?;
-    let digests =
-        Digests::of(&job, &output, engine)?.after(base.state.inputs.len(), asked(request, &base));
+    let digests = Digests::of(&job, &output, engine)?
+        .after(base.state.inputs.len(), request_text(request, &base));
     if let Some(manifest) = digests.unchanged(&job, &output)? {
         return Ok(manifest.outcome());
     }
-    Rescan { base: &base, job: &job, output: &output, digests: &digests, engine }.whole(request)
+    Rescan { base: &base, job: &job, output: &output, digests: &digests, engine }.execute(request)
 }
 
-/// A rescan that has something to do.
+/// A rescan that is not answered by an unchanged result.
 struct Rescan<'a> {
     base: &'a EarlierResult,
-    /// With the base's library and ways of writing.
+    /// The job with library and export settings of the earlier result.
     job: &'a Job,
     output: &'a OutputDir,
     digests: &'a Digests,
@@ -81,38 +81,39 @@ struct Rescan<'a> {
 }
 
 impl Rescan<'_> {
-    fn whole(&self, request: &RescanRequest) -> Result<Outcome> {
+    fn execute(&self, request: &RescanRequest) -> Result<Outcome> {
         let &Rescan { base, job, output, digests, engine } = self;
         let settings = &job.means.settings;
         base.share_store(output)?;
-        let models_kept = Cache::new(output.models(), digests.models(settings));
+        let models_kept = Cache::new(output.models(), digests.models_key(settings));
         let (library, mut sources) = self.given(&models_kept)?;
 
-        // The new scans into tiles; those of the plant are there.
+        // The new scans are read into tiles; those of the plant exist already.
         let (tiles, mut new, n_kept) = self.tiles(&sources)?;
         let contents = [base.state.contents.clone(), new.contents()].concat();
         let old = base.store(output, job.means.store_bytes())?;
 
-        // Which frame the new scans are in: they are carried into that of the plant.
+        // The new scans are carried to the frame of the plant.
         let mut plant = library::robots_of(base.state.fits.clone(), &library)?;
         let scans = base.state.scans.clone();
         let past = EarlierPoints::new(base, &scans, &old, Aabb::EMPTY)?;
-        let stood = session::stood(plant.view());
+        let stood = session::earlier_bounds(plant.view());
         let wish = &request.frame;
         let carried = frame::carry(wish, &past, stood, &mut sources, &mut new, engine)?;
 
-        // Where the cell is; the new scans are taken back by what they are off what stood there.
+        // The cell is determined, and the new scans are registered to the earlier surfaces.
         let cell = session::bounds(&request.cell, base, plant.view(), &sources, &new)?;
         let past = &past.of_cell(cell);
         let prepared = &PreparedLibrary::new(&library.models);
-        let names = session::known(plant.view(), &cell);
+        let names = session::model_names(plant.view(), &cell);
         let (floor, hangs) = (&base.state.floor, robots::hang(&plant.fits, &past.cell));
         let known = || {
             prepared.prepare(&names, &OneByOne);
             Ok(())
         };
         let (sources_laid, store) = (&mut sources, &new);
-        // Reading waits for disks: what fits of the cell's robots need is made meanwhile.
+        // Reading waits for disks, so the models of the cell's robots are prepared at the same
+        // time.
         let ((), (registered, session)) = engine.join("models", known, move || {
             let registered = session::register(past, store, sources_laid, engine)?;
             let (sources, library) = (&*sources_laid, prepared);
@@ -120,19 +121,20 @@ impl Rescan<'_> {
             Ok((registered, CellComparison::new(both, settings, engine)?))
         })?;
 
-        // Robots and things of the cell, then and now.
+        // Robots and other bodies of the cell, then and now.
         let (robots, labels) = session.compare(&mut plant, engine)?;
 
-        // New masks and records of the new scans, tiles of the cell anew, all the rest as it was.
+        // Masks and records of the new scans and tiles of the cell are written; all other files are
+        // shared.
         let (session, robots, labels, carried) = (&session, &robots, &labels, &carried);
         let RobotList { fits, models } = &plant;
-        let found = Found { base, session, robots, labels, models, fits, carried };
+        let found = RescanFindings { base, session, robots, labels, models, fits, carried };
         let written = found.write(&registered, output, digests, engine)?;
         let all: Vec<Key> = base.state.tiles.iter().chain(&tiles).cloned().collect();
         let mut outcome = written.outcome;
         let frame = carried.plant_from_new;
         let made = MadeAnew { robots, sources: &sources, tiles: &all, contents, frame };
-        outcome.told = self.conclude(plant.fits, made, written.known, &outcome)?;
+        outcome.notes = self.conclude(plant.fits, made, written.known, &outcome)?;
         output.prune_tiles(&all, &models_kept);
         let names = ["models", "tiles of new scans", "files of the earlier result"];
         let n_kept = [models_kept.n_kept(), n_kept, written.n_shared];
@@ -140,8 +142,7 @@ impl Rescan<'_> {
         Ok(outcome)
     }
 
-    /// The tiles of the new scans: keys of their folders, one store of all, and how many were there
-    /// already.
+    /// Tiles of the new scans: their keys, one store of all, and how many existed already.
     fn tiles(&self, sources: &Sources) -> Result<(Vec<Key>, Store, [usize; 2])> {
         let &Rescan { base, job, output, digests, engine } = self;
         let input_tiles = InputTiles::new(sources, &job.means, output.tiles(), engine);
@@ -150,7 +151,7 @@ impl Rescan<'_> {
         Ok((tiles, store, input_tiles.n_kept()))
     }
 
-    /// Reads the library, and opens the new scans behind those of the base.
+    /// Reads the library, and opens the new scans, numbered after those of the earlier result.
     fn given(&self, models_kept: &Cache) -> Result<(Library, Sources)> {
         let &Rescan { base, job, engine, .. } = self;
         let settings = &job.means.settings;
@@ -168,8 +169,8 @@ impl Rescan<'_> {
         Ok((library, sources))
     }
 
-    /// All is whole, and of the inputs that the rescan began with: it takes its place. Robots that
-    /// stand as they stood are handed on as the base has them.
+    /// Publishes the complete result after a check that the inputs are unchanged. Unchanged robots
+    /// are passed on as the earlier result has them.
     fn conclude(
         &self,
         mut fits: Vec<Fit>,
@@ -203,19 +204,19 @@ impl Rescan<'_> {
     }
 }
 
-/// What is not as it was in the earlier result.
+/// The parts of the state that differ from the earlier result.
 struct MadeAnew<'a> {
     robots: &'a ComparedRobots,
     sources: &'a Sources,
-    /// Tiles of all inputs, and what their stores hold.
+    /// Keys of the tiles of all inputs, and digests of their stores.
     tiles: &'a [Key],
     contents: Vec<String>,
-    /// What carried the new scans into the plant's frame.
+    /// Pose that carried the new scans to the plant's frame.
     frame: Option<Pose>,
 }
 
-/// What a rescan is asked for beside its inputs and settings, for its digest.
-fn asked(request: &RescanRequest, base: &EarlierResult) -> String {
+/// Text of the request besides inputs and settings, for its digest.
+fn request_text(request: &RescanRequest, base: &EarlierResult) -> String {
     let frame = match request.frame {
         Frame::Find => String::new(),
         other => format!(" {other:?}"),
@@ -223,23 +224,23 @@ fn asked(request: &RescanRequest, base: &EarlierResult) -> String {
     format!("{} {:?}{frame}", base.files.digest(), request.cell)
 }
 
-/// The job with the base's library and ways of writing.
+/// The job with library and export settings of the earlier result.
 fn job(request: &RescanRequest, base: &EarlierResult) -> Result<Job> {
     let mut job = request.job.clone();
     if job.robots.as_os_str().is_empty() {
         job.robots.clone_from(&base.state.robots);
     }
     if !job.robots.is_dir() {
-        return Err(Error::bad_input("the robot library is not there")
+        return Err(Error::bad_input("the robot library of the earlier result is missing")
             .at(job.robots.display())
             .hint("name it with --robots"));
     }
-    job.apart(&request.base)?;
+    job.refuse_base_overlap(&request.base)?;
     job.means.settings.export = base.state.records.export(&job.means.settings.export);
     Ok(job)
 }
 
-/// Refuses an input that the base was made of.
+/// Refuses an input that is part of the earlier result.
 fn fresh(input: &Input, base: &EarlierResult, digests: &Digests) -> Result<()> {
     let own = digests.input(input).unwrap_or_default();
     match base.result.inputs.iter().find(|i| i.digest == own) {

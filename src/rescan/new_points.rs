@@ -1,5 +1,5 @@
-//! Points of the new scans in; how far each scan is off the plant, and what stands still in the
-//! cell now, out.
+//! Points of the new scans: the registration of each scan to the plant, and the occupancy of the
+//! cell in the new session.
 
 use super::earlier_points::{World, area, sampled, seen};
 use crate::engine::Engine;
@@ -12,11 +12,11 @@ use geometry::{Aabb, Point};
 use register::{Planes, Registration};
 use segment::FloorHeights;
 
-/// Points of a scan that are laid on the plant's surfaces, about.
+/// Approximate number of points of a scan that are registered to the plant's surfaces.
 const N_LAID: u64 = 100_000;
 
-/// How each new scan, from the number `first` on, is off the plant; none where too little of what
-/// stood is seen.
+/// Registration of each new scan, from the number `first` on; `None` for a scan that sees too few
+/// earlier surfaces.
 pub(crate) fn register(
     planes: &Planes,
     scans: &[Scan],
@@ -40,21 +40,21 @@ pub(crate) fn register(
     })
 }
 
-/// What stands still in a cell, and where the earlier scans saw nothing.
+/// The map from tiles of the new scans to the occupancy of the cell.
 pub(crate) struct NewPoints<'a> {
     pub(crate) scans: &'a [Scan],
     pub(crate) near: &'a NearRobots,
     pub(crate) ground: &'a FloorHeights,
     pub(crate) cell: Aabb,
-    /// What stood there: the earlier scans are asked only where nothing of it is near.
+    /// Earlier occupancy: the earlier scans are looked up only where it has nothing near.
     pub(crate) then: &'a SessionOccupancy,
-    /// Earlier scans.
+    /// Look-up in the earlier scans.
     pub(crate) watch: &'a VisibilityQuery<'a>,
-    /// The new ones.
+    /// Look-up in the new scans.
     pub(crate) own: &'a VisibilityQuery<'a>,
 }
 
-/// What one tile adds.
+/// Occupancy of one tile.
 pub(crate) struct Tallied(SessionOccupancy);
 
 impl NewPoints<'_> {
@@ -81,7 +81,7 @@ impl Map for NewPoints<'_> {
         let scan = &self.scans[tile.at.scan.0 as usize];
         let mut out = OccupancyBuilder::default();
         let (in_world, mut near) = (World::from(scan), self.near.of(scan.mask));
-        // Neighbours are mostly in one voxel, and ask once whether something stood there.
+        // Consecutive points mostly share a voxel, for which the look-up is made once.
         let (mut last, mut stood) = (None, false);
         for (xyz, place) in tile.xyz.iter().zip(&tile.place) {
             let world = in_world.of(*xyz);

@@ -1,5 +1,5 @@
-//! A robot's fit on the base that it had, and what both sessions saw about it, in; whether another
-//! model may stand there instead, out: a search of all models is only worth it then.
+//! Decides whether another model may stand on the base of an earlier robot, from the fit of the
+//! earlier model and both sessions. Only then all models are searched.
 
 use crate::label::known_space::poses;
 use contract::{Fit, Verdict};
@@ -8,19 +8,20 @@ use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 
-/// What stands so near a base was there before, or is its own: cables, plinth, metres.
+/// Distance from a base within which new points may be cables or a plinth, metres.
 const ABOUT_FOOT: f64 = 0.3;
-/// How far beyond the boxes of its links points are a robot's own: hoses, covers, metres.
+/// Distance from the boxes of its links up to which points belong to the robot (hoses, covers),
+/// metres.
 const OWN: f64 = 0.08;
-/// Share of what is new within its reach that need not be its own: a tool, a box that was put
-/// there. Of robots that only moved, in halls with other things moved about them, it was up to a
+/// Largest share of new points within its reach that need not belong to the robot, such as a tool
+/// or a box. For robots that only moved, in halls with other changes around them, it was up to a
 /// half.
 const MAX_STRANGE: f64 = 0.5;
-/// Points that are looked at.
+/// Number of points that are examined.
 const ASKED: usize = 4000;
 
-/// Whether nothing speaks against a fit on an old base: neither the beams nor what is new there. If
-/// it is doubtful, then because too little of it was seen, and of another model as little would be.
+/// Whether neither beams nor new points contradict a fit on an earlier base. If such a fit is
+/// doubtful, too little was seen, and of another model as little would be.
 pub(crate) fn is_the_same(
     fit: &Fit,
     model: &Model,
@@ -32,8 +33,8 @@ pub(crate) fn is_the_same(
             && strange(fit, model, scene, other_session) <= MAX_STRANGE
 }
 
-/// Share of what stands within a robot's reach, where the other session saw that nothing did, that
-/// is not its own.
+/// Share of the points within a robot's reach, where the other session saw free space, that do not
+/// belong to the robot.
 fn strange(
     fit: &Fit,
     model: &Model,

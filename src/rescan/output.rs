@@ -1,8 +1,8 @@
-//! What a rescan found in; masks of the new scans, tiles of the cell anew, the rest of the earlier
-//! result shared, and the result that joins them, out.
+//! Writes the result of a rescan: masks of the new scans, new tiles of the cell, shared files of
+//! the earlier result, and the result that joins them.
 
 use super::earlier_points::EarlierPoints;
-use super::found::Found;
+use super::found::RescanFindings;
 use super::report;
 use super::report::RescanReport;
 use crate::cache::{Digests, OutputDir, OutputFile};
@@ -25,16 +25,16 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// What came of it.
+/// Counts and checksums of the written result.
 pub(crate) struct WrittenResult {
     pub(crate) outcome: Outcome,
-    /// Files whose checksums are known.
+    /// Entries of files whose checksums are known.
     pub(crate) known: Vec<OutputFile>,
-    /// Files that the earlier result has, too, and all.
+    /// Number of files shared with the earlier result, and of all files.
     pub(crate) n_shared: [usize; 2],
 }
 
-impl Found<'_, '_> {
+impl RescanFindings<'_, '_> {
     pub(crate) fn write(
         &self,
         registered: &[Option<Registration>],
@@ -45,7 +45,7 @@ impl Found<'_, '_> {
         let next = output.next();
         let scratch = output.scratch();
         let gone = self.gone();
-        // Places of old points are listed while the new ones are labelled and tiles are written.
+        // Superseded places are listed while new points are labelled and tiles are written.
         let lists = || self.lists(&gone, next);
         let own = self.session.own_fits(self.fits, self.robots);
         let labelling = self.session.labelling(FittedRobots { fits: &own, models: self.models });
@@ -92,7 +92,7 @@ impl Found<'_, '_> {
         Ok(WrittenResult { outcome, known, n_shared })
     }
 
-    /// The COPC file, which is made of all tiles, those that did not change, too.
+    /// Writes the COPC file from all tiles, including unchanged ones.
     fn write_copc(&self, shared: &[OutputFile], output: &OutputDir, engine: &Engine) -> Result<()> {
         let (next, scratch) = (output.next(), output.scratch());
         let tiles = shared.iter().filter(|file| file.path.starts_with("tiles/")).collect();
@@ -102,8 +102,8 @@ impl Found<'_, '_> {
         copc::write(&export::tiles(next)?, &next.join(COPC), &scratch, engine).map(drop)
     }
 
-    /// Masks of the new scans, clouds of their points in the cell; and files of robots that stand
-    /// otherwise, still to be written.
+    /// Writes masks of the new scans and clouds of their points in the cell; the files of changed
+    /// robots are written later.
     fn label<'l>(
         &'l self,
         labelling: &'l Labelling<'l>,
@@ -125,8 +125,8 @@ impl Found<'_, '_> {
         labelling.write(&self.labels.near, spaces, &scope, to, engine)
     }
 
-    /// Voxels of things that are gone and of robots that the earlier result missed, and those next
-    /// to them.
+    /// Voxels of bodies that are gone and of robots that the earlier result missed, and their
+    /// neighbours.
     fn gone(&self) -> BTreeSet<[i32; 3]> {
         let things = self.labels.things.iter().filter(|t| t.change != ThingChange::Appeared);
         let near = |c: &[i32; 3]| {
@@ -143,7 +143,7 @@ impl Found<'_, '_> {
         self.robots.changed.contains(&robot) || self.robots.gone.contains(&robot)
     }
 
-    /// Which points of the earlier result are still part of the plant, as the new scans see it.
+    /// Which points of the earlier result remain valid for the new scans.
     fn stay(
         &self,
         points: &[OldPoint],
@@ -153,7 +153,7 @@ impl Found<'_, '_> {
         let left = |p: &OldPoint| p.label.moves() && self.stands_otherwise(p.label.robot);
         let mut stays: Vec<bool> = points.iter().map(|p| !left(p)).collect();
         let (mut here, mut worlds, mut sights) = (Vec::new(), Vec::new(), Vec::new());
-        // Neighbours are mostly in one voxel.
+        // Consecutive points mostly share a voxel.
         let mut last = None;
         for (i, point) in points.iter().enumerate() {
             if !stays[i] || !self.session.past.cell.contains(point.world) {
@@ -184,8 +184,8 @@ impl Found<'_, '_> {
         stays
     }
 
-    /// Tiles that the cell touches, and the cloud of all that moves: behind the new points of each
-    /// (those of `open` are in it already) comes what is left of the old ones.
+    /// Writes the tiles that the cell touches, and the cloud of moving points: new points first
+    /// (tiles in `open` contain them), then the remaining old ones.
     fn tiles(
         &self,
         open: Vec<Spool>,
@@ -211,7 +211,7 @@ impl Found<'_, '_> {
         let mut all: Vec<(String, Spool)> =
             tiles.into_iter().map(|(path, tile)| (name(&path), tile)).collect();
         let names: BTreeSet<String> = all.iter().map(|(name, _)| name.clone()).collect();
-        // The largest first: none is left that one thread writes alone while others wait.
+        // The largest tiles are written first, so that no thread works alone at the end.
         let n_bytes = |name: &str| self.base.out.join(name).metadata().map_or(0, |m| m.len());
         all.sort_by_cached_key(|(name, _)| (Reverse(n_bytes(name)), name.clone()));
         let watch = self.session.watch();
@@ -240,7 +240,7 @@ impl Found<'_, '_> {
         Ok(Touched { names, digests, spots: spots.concat() })
     }
 
-    /// Writes lists of the places of old points that are superseded, of masks whose list grew.
+    /// Writes the lists of superseded places of masks whose list has grown.
     fn lists(&self, gone: &BTreeSet<[i32; 3]>, next: &Path) -> Result<Lists> {
         let past = self.session.past;
         let superseded =
@@ -267,8 +267,8 @@ impl Found<'_, '_> {
     }
 }
 
-/// Lists of superseded places: of each mask the name, those that grew, and how many places all of
-/// them have.
+/// Lists of superseded places: the name for each mask, names of those that have grown, and the
+/// number of all places.
 #[derive(Default)]
 struct Lists {
     names: Vec<Option<String>>,
@@ -280,11 +280,11 @@ struct Lists {
 struct Touched {
     names: BTreeSet<String>,
     digests: Vec<FileSum>,
-    /// Voxels of what is left of the old points.
+    /// Voxels of the remaining old points.
     spots: Vec<VoxelMark>,
 }
 
-/// Voxels of those points that stay.
+/// Voxels of the points that remain valid.
 fn spots_of(points: &[OldPoint], stays: &[bool], grids: &SpaceGrids) -> Vec<VoxelMark> {
     let (worlds, labels): (Vec<_>, Vec<_>) = points.iter().map(|p| (p.world, p.label)).unzip();
     grids.spots(&worlds, &labels, &blocks(&worlds), |i| stays[i])

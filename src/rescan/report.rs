@@ -1,7 +1,7 @@
-//! What a rescan found in; the result of the whole plant, the list of changes as JSON, CSV and
-//! picture, and a summary for people, out.
+//! Writes the result of the whole plant after a rescan, the changes as JSON, CSV and picture, and
+//! the summary for people.
 
-use super::found::Found;
+use super::found::RescanFindings;
 use crate::cache::Digests;
 use crate::detect::robot_id::robot_id;
 use crate::job::Outcome;
@@ -21,7 +21,7 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Files that are written here.
+/// Names of the files that this module writes.
 pub(crate) const NAMES: [&str; 6] = [
     "result.json",
     "plant.bin",
@@ -31,12 +31,12 @@ pub(crate) const NAMES: [&str; 6] = [
     "pictures/changes.png",
 ];
 
-/// Everything that is said.
+/// Everything that result, changes and summary are made of.
 pub(crate) struct RescanReport<'a, 's> {
-    pub(crate) found: &'a Found<'a, 's>,
+    pub(crate) found: &'a RescanFindings<'a, 's>,
     pub(crate) done: &'a WrittenLabels,
     pub(crate) registered: &'a [Option<Registration>],
-    /// By mask of the base: the list of its superseded places.
+    /// For each mask of the earlier result, the list of its superseded places.
     pub(crate) lists: &'a [Option<String>],
     pub(crate) n_superseded: u64,
 }
@@ -67,7 +67,7 @@ impl RescanReport<'_, '_> {
         Ok(Outcome { summary, warnings: result.warnings, ..Outcome::default() })
     }
 
-    /// The result of the whole plant: entries of what did not change are those of the base.
+    /// The result of the whole plant; entries of unchanged robots are those of the earlier result.
     fn result(&self, digests: &Digests) -> ResultFile {
         let mut result = self.found.base.result.clone();
         for &i in self.found.robots.changed.iter().chain(&self.found.robots.gone) {
@@ -147,7 +147,7 @@ impl RescanReport<'_, '_> {
         scans.filter_map(entry).collect()
     }
 
-    /// Robots of the cell, then and now.
+    /// Changes of the robots of the cell.
     fn changes(&self, result: &ResultFile) -> Vec<RobotChange> {
         let looked: Vec<String> = self.found.robots.compared().into_iter().map(robot_id).collect();
         let mut all = changes(&self.found.base.result, result);
@@ -158,8 +158,8 @@ impl RescanReport<'_, '_> {
                 .filter(|c| c.now.as_ref() == Some(&id))
                 .for_each(|c| *c = of_missed(&id, stood, own));
         }
-        // Where joints are left open, others alone do not say that a robot stands as it stood when
-        // beams went through it.
+        // A robot with undetermined joints is not unchanged if beams contradict its earlier
+        // posture.
         let contradicted: Vec<String> =
             self.found.robots.contradicted.iter().copied().map(robot_id).collect();
         let open =
@@ -292,7 +292,7 @@ impl RescanReport<'_, '_> {
     }
 }
 
-/// Which frame the new scans are in.
+/// The frame of the new scans, as text.
 fn frame_in_words(frame: &CarriedEntry) -> String {
     let [qx, qy, qz, qw] = frame.quat_xyzw;
     let yaw = (2.0 * (qw * qz + qx * qy)).atan2(1.0 - 2.0 * (qy * qy + qz * qz)).to_degrees();

@@ -1,5 +1,5 @@
-//! A robot of the earlier result, and what the new scans saw, in; how it stands now, or that it is
-//! gone, out.
+//! Compares a robot of the earlier result with the new scans: its present fit, or that it is gone
+//! or lost.
 
 use super::other_model::is_the_same;
 use crate::detect::search::Search;
@@ -12,55 +12,56 @@ use freespace::{Visibility, VisibilityQuery};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 
-/// Points of each link's surface that the new scans are asked about.
+/// Number of surface points of each link that are looked up in the new scans.
 const ASKED: usize = 400;
-/// Share of those that they must have judged for the robot to be compared at all.
+/// Least share of these that must be seen for the robot to be compared.
 const MIN_JUDGED: f64 = 0.06;
-/// Share of the judged that they went through up to which it may still stand so, though too little
-/// of it is seen for a fit; and from which on it does not stand so any more. Fences and edges make
-/// up to a tenth.
+/// Share of the seen points with beams through them up to which a robot may stand unchanged, though
+/// too little of it is seen for a fit. Fences and edges cause up to a tenth.
 const STANDS: f64 = 0.1;
+/// The same share beyond which the earlier posture is contradicted.
 const CONTRADICTED: f64 = 0.25;
-/// The same of the link that it stands on: it has gone.
+/// The same share for the foot link, from which on the robot is gone.
 const GONE: f64 = 0.6;
-/// A base farther from the old one is another robot's, metres.
+/// Distance of bases beyond which a fit is of another robot, metres.
 const SAME_PLACE: f64 = 0.5;
 
-/// A link that turns by more against its base than this, radians, is none of its foot; one that
-/// turns by no more in the world, and whose corners are no farther from where they were than this,
-/// metres, stays: two sessions are registered to within millimetres.
+/// A link that turns against its base by more than this angle, radians, does not belong to the
+/// foot. A link whose rotation in the world changes by no more, and whose corners move by no more
+/// than the distance below, metres, has not moved: sessions are registered within millimetres.
 const FOOT_TURNS: f64 = 0.001_75;
+/// Greatest motion of the corners of a link that has not moved, metres: sessions are registered
+/// within millimetres.
 const STAYS: f64 = 0.005;
 
-/// Cosine of the tilt from which on a robot stands on no floor.
+/// Cosine of the tilt beyond which a robot does not stand on a floor.
 const UPRIGHT: f64 = 0.9;
 
-/// How a robot stands now.
-pub(crate) enum Now {
-    /// As found by the new scans.
+/// State of an earlier robot in the new scans.
+pub(crate) enum RobotState {
+    /// It was refined from its earlier posture.
     Found(Box<Fit>),
-    /// It was searched anew, and found so; and whether they contradict how it stood.
+    /// It was searched and found again; and whether the new scans contradict its earlier posture.
     Anew(Box<Fit>, bool),
-    /// It stands no longer there.
+    /// It is gone.
     Gone,
-    /// The new scans saw too little of it; what they saw does not contradict that it stands as it
-    /// stood.
+    /// The new scans see too little of it, and do not contradict its earlier posture.
     Unseen,
-    /// They saw too little of it, and that speaks against how it stood.
+    /// The new scans see too little of it for a fit, and contradict its earlier posture.
     Open,
-    /// They contradict how it stood, and show no other posture.
+    /// The new scans contradict its earlier posture, and show no other one.
     Lost,
 }
 
-/// What the new scans say of a posture: points of the surface that were judged, of all, and gone
-/// through, of the judged; and the same share of the link it stands on.
+/// Evidence about a posture: the share of all surface points that were seen, the share of those
+/// with beams through them, and the latter share for the foot link.
 struct PostureEvidence {
     judged: f64,
     through: f64,
     foot: f64,
 }
 
-/// Whether robots about a cell hang on walls or ceilings.
+/// Whether robots near a cell are mounted on walls or ceilings.
 pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
     let about = cell.grown(SAME_PLACE);
     let here = |f: &&Fit| about.contains(f.world_from_base.translation.vector.into());
@@ -68,84 +69,87 @@ pub(crate) fn hang(fits: &[Fit], cell: &Aabb) -> bool {
     fits.iter().filter(here).any(|fit| up(fit) < UPRIGHT)
 }
 
-/// No robot of a library reaches farther than this from its base, but for those on rails, metres.
+/// Reach of robots of a library, except those on rails, metres.
 const FAR_REACH: f64 = 4.0;
 
-/// What the scans of two sessions show of a cell.
+/// Search and look-ups in one of two sessions.
 pub(crate) struct Observed<'s, 'a, 'm> {
-    /// The search in the scans of this session.
+    /// Search in the scans of this session.
     pub(crate) search: &'s Search<'a, 'm>,
-    /// What these scans, and those of the other session, say of places.
+    /// Look-up in the scans of this session.
     pub(crate) watch: &'s VisibilityQuery<'s>,
+    /// Look-up in the scans of the other session.
     pub(crate) other_session: &'s VisibilityQuery<'s>,
-    /// Regions of this session.
+    /// Regions that were found in this session.
     pub(crate) regions: &'s [Region],
 }
 
-/// Looks at one robot again, through the scans of this session and of the other. The model is its
-/// own, where it is none of the library.
-pub(crate) fn look(
+/// Compares one robot with the scans of this session and of the other; the model is returned where
+/// it is not in the library.
+pub(crate) fn compare_robot(
     before: &Fit,
     models: &[Model],
     seen: &Observed<'_, '_, '_>,
-) -> Result<(Now, Option<Model>)> {
+) -> Result<(RobotState, Option<Model>)> {
     let &Observed { search, watch, other_session, regions } = seen;
     let model = &models[before.model];
-    let said = said(before, model, watch);
+    let said = evidence_of(before, model, watch);
     if said.judged < MIN_JUDGED {
-        return Ok((if said.through < STANDS { Now::Unseen } else { Now::Open }, None));
+        return Ok((
+            if said.through < STANDS { RobotState::Unseen } else { RobotState::Open },
+            None,
+        ));
     }
     let near = home(before, model, regions);
-    // Where the new scans see through much of how it stood, it stands otherwise: that is told from
-    // its base alone.
+    // If new beams pass through much of the earlier posture, the robot has moved and is searched
+    // from its base alone.
     if said.through <= CONTRADICTED
         && let Some(fit) = search.again(&near, before, model)?
     {
-        // What is known of how it stood counts for how it stands, but only where all of that is
-        // seen again.
+        // The earlier verdict supports the present fit only where all joints are determined again.
         let mut sure = fit.clone();
         verdict::apply(&mut sure, &VerdictEvent::SeenAgain(before.verdict));
         let is_same =
             !crate::result::changes::stands_otherwise(before, &sure) && knows(&fit, before);
         match fit.verdict {
             Verdict::Trusted | Verdict::Doubtful if only_foot_turns(before, &fit, model) => {
-                return Ok((Now::Found(Box::new(before.clone())), None));
+                return Ok((RobotState::Found(Box::new(before.clone())), None));
             }
-            Verdict::Trusted if !is_same => return Ok((Now::Found(Box::new(fit)), None)),
+            Verdict::Trusted if !is_same => return Ok((RobotState::Found(Box::new(fit)), None)),
             Verdict::Trusted | Verdict::Doubtful if is_same => {
-                return Ok((Now::Found(Box::new(sure)), None));
+                return Ok((RobotState::Found(Box::new(sure)), None));
             }
             _ => {}
         }
     }
     if said.through < STANDS && before.verdict != Verdict::Refused {
-        return Ok((Now::Unseen, None));
+        return Ok((RobotState::Unseen, None));
     }
-    Ok(match anew(before, models, search, other_session, &near)? {
-        Some((fit, own)) => (Now::Anew(Box::new(fit), said.through > CONTRADICTED), own),
-        None if said.foot > GONE => (Now::Gone, None),
-        None if said.through > CONTRADICTED => (Now::Lost, None),
-        None => (Now::Open, None),
+    Ok(match search_again(before, models, search, other_session, &near)? {
+        Some((fit, own)) => (RobotState::Anew(Box::new(fit), said.through > CONTRADICTED), own),
+        None if said.foot > GONE => (RobotState::Gone, None),
+        None if said.through > CONTRADICTED => (RobotState::Lost, None),
+        None => (RobotState::Open, None),
     })
 }
 
-/// Whether two postures differ in nothing but how the foot stands under links that stay where they
-/// are. Of a round foot that few points show, the turn trades with the first joint: that the one
-/// was undone by the other is no change that anybody makes.
+/// Whether two postures differ only in the foot, under links that have not moved. The turn of a
+/// round foot with few points trades off with the first joint; that one undoes the other is no real
+/// change.
 fn only_foot_turns(then: &Fit, now: &Fit, model: &Model) -> bool {
     let bounds: Vec<Aabb> = model.links.iter().map(|link| link.bounds).collect();
     let stood = |fit: &Fit| (fit.world_from_base, poses(fit, model));
     is_foot_alone([&stood(then), &stood(now)], &bounds)
 }
 
-/// The same of bases and links, then and now, and the links' bounds.
+/// The same check for bases and links (before, now) and the links' bounds.
 fn is_foot_alone([then, now]: [&(Pose, Vec<Pose>); 2], bounds: &[Aabb]) -> bool {
     let own =
         |(base, links): &(Pose, Vec<Pose>), l: usize| base.rotation.inverse() * links[l].rotation;
     let turns = |l: &usize| own(then, *l).angle_to(&own(now, *l)) > FOOT_TURNS;
     let stays = |l: usize| {
         let shift = |c: [f64; 3]| (then.1[l] * Point::from(c) - now.1[l] * Point::from(c)).norm();
-        // A small link, of a wrist, can turn far while its corners hardly move.
+        // A small wrist link can turn far while its corners hardly move.
         then.1[l].rotation.angle_to(&now.1[l].rotation) <= FOOT_TURNS
             && bounds[l].corners().into_iter().all(|corner| shift(corner) <= STAYS)
     };
@@ -154,15 +158,15 @@ fn is_foot_alone([then, now]: [&(Pose, Vec<Pose>); 2], bounds: &[Aabb]) -> bool 
     !moved.is_empty() && !foot.is_empty() && moved.into_iter().all(stays)
 }
 
-/// Whether the points of one fit determine all joints that those of another do.
+/// Whether a fit determines all joints that another fit determines.
 fn knows(fit: &Fit, other: &Fit) -> bool {
     let mut joints = fit.joints.iter().zip(&other.joints);
     joints.all(|(own, other)| own.is_determined() || !other.is_determined())
 }
 
-/// A robot that does not stand as it stood, searched anew at its place; with the model of its own,
-/// where it has one.
-fn anew(
+/// Searches a robot with a changed posture at its place; the model is returned where it is not in
+/// the library.
+fn search_again(
     before: &Fit,
     models: &[Model],
     search: &Search<'_, '_>,
@@ -171,7 +175,7 @@ fn anew(
 ) -> Result<Option<(Fit, Option<Model>)>> {
     let world_from_base = &before.world_from_base;
     let bare = models.iter().position(|m| m.name == before.model_name).unwrap_or(before.model);
-    // Its arm may have left what stands about its base.
+    // Its arm may have left the region of its base.
     let region = reach(before, &models[before.model]);
     let base = Point::from(world_from_base.translation.vector);
     let is_here = |at: &Point| (at - base).norm() < SAME_PLACE;
@@ -184,7 +188,7 @@ fn anew(
         let mut tried: Vec<(bool, Fit)> = on_base(scene).into_iter().collect();
         let is_clear = |tried: &[(bool, Fit)]| tried.iter().any(|(is_same, _)| *is_same);
         if !is_clear(&tried) {
-            // What stands about its base alone is looked at more closely.
+            // The surroundings of its base are searched at a finer resolution.
             tried.extend(search.in_scene(&beside(near, base), |scene, _| on_base(scene))?);
         }
         let is_clear = is_clear(&tried);
@@ -205,7 +209,7 @@ fn anew(
     })?
 }
 
-/// The part of a region that a robot on a base may take.
+/// The part of a region that a robot on a base can fill.
 fn beside(region: &Region, base: Point) -> Region {
     let mut bounds = region.world_bounds();
     for i in 0..2 {
@@ -215,15 +219,14 @@ fn beside(region: &Region, base: Point) -> Region {
     crate::label::known_space::region(&bounds.center(), &bounds)
 }
 
-/// The region of the new scans that a robot stands in; all that it can get to, where it stands in
-/// none.
+/// The region of the new scans that contains a robot; its whole reach where none does.
 fn home(fit: &Fit, model: &Model, regions: &[Region]) -> Region {
     let base = fit.world_from_base.translation.vector;
     let own = regions.iter().find(|r| r.world_bounds().grown(0.3).contains(base.into()));
     own.copied().unwrap_or_else(|| reach(fit, model))
 }
 
-fn said(fit: &Fit, model: &Model, watch: &VisibilityQuery<'_>) -> PostureEvidence {
+fn evidence_of(fit: &Fit, model: &Model, watch: &VisibilityQuery<'_>) -> PostureEvidence {
     let (mut n, mut judged, mut through) = (0_usize, 0_usize, 0_usize);
     let mut foot = None;
     for (link, pose) in model.links.iter().zip(poses(fit, model)) {
@@ -264,10 +267,10 @@ mod tests {
             is_foot_alone([&stood(0.3, 0.5), &stood(0.3 + yaw, 0.5 + joint)], &[foot, arm])
         };
         assert!(is_alone(-0.061, 0.062));
-        // The arm has moved, with its foot or alone; or nothing turns.
+        // Either the arm has moved, with its foot or alone, or nothing turns.
         assert!(!is_alone(-0.061, 0.075) && !is_alone(0.0, 0.062) && !is_alone(-0.061, 0.0));
         assert!(!is_alone(0.0, 0.0));
-        // A flange that turns by 3° moves its corners by 2 mm, and has moved.
+        // A flange that turns by 3° has moved, though its corners move by only 2 mm.
         let flange = Aabb { min: [-0.03, -0.03, 0.0], max: [0.03, 0.03, 0.02] };
         assert!(!is_foot_alone([&stood(0.3, 0.5), &stood(0.3, 0.552)], &[foot, flange]));
     }

@@ -1,11 +1,11 @@
-//! Compares the earlier and the new scans of a cell: how its robots stand now, and what else is no
-//! longer where it was.
+//! Compares the earlier and the new scans of a cell: the present state of its robots, and all other
+//! bodies that changed.
 
-use super::earlier_points::{Compared, EarlierPoints};
+use super::earlier_points::{ComparedPoints, EarlierPoints};
 use super::earlier_result::EarlierResult;
 use super::new_points;
 use super::new_points::NewPoints;
-use super::robots::{Now, Observed, look};
+use super::robots::{Observed, RobotState, compare_robot};
 use crate::detect::ground::Ground;
 use crate::detect::robots::{FittedRobots, RobotList};
 use crate::detect::search::{PreparedLibrary, Search};
@@ -27,32 +27,32 @@ use lattice::ViewSettings;
 use register::Registration;
 use std::collections::BTreeSet;
 
-/// Which part of a plant was scanned again.
+/// The part of a plant that was scanned again.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
-    /// Within these bounds, world, metres.
+    /// These bounds, world frame, metres.
     Box(Aabb),
-    /// All that these robots reach, by their ids.
+    /// The reach of the robots with these ids.
     Robots(Vec<String>),
-    /// What the new scans see well.
+    /// Everything that the new scans see well.
     Seen,
 }
 
-/// How far from its scanner a new scan may see the cell, metres, where nobody says where it is: a
-/// robot cell.
+/// Greatest distance of the cell from its scanner where the cell is not stated, metres: a robot
+/// cell.
 const CELL_RADIUS: f64 = 8.0;
-/// Beams farther apart say less than the scans that were there, metres.
+/// Distance of neighbouring beams beyond which new scans are worse than the earlier ones, metres.
 const CELL_SPACING: f64 = 0.025;
-/// Cells of depth images in a unit of their plane, at most, and nearest distance for which they are
-/// as fine, metres: 2.5 mm at 1 m, as fine as a common scan.
+/// Smallest cell of depth images per unit of their plane, and the nearest distance with that
+/// resolution, metres: 2.5 mm at 1 m, as fine as a common scan.
 const LOOK_CELL: f64 = 0.3 / 400.0;
-/// Earlier scans that are asked what was there: those with most points in the cell.
+/// Most earlier scans that are looked up: those with most points in the cell.
 const MAX_ASKED: usize = 6;
-/// The scans of both sessions, and what is known of the plant.
+/// Scans of both sessions, robots and floor of the plant.
 pub(crate) struct BothScans<'a> {
-    /// That of the plant.
+    /// Floor of the plant.
     pub(crate) floor: &'a Floor,
-    /// Whether robots of the cell hang on walls or ceilings.
+    /// Whether robots of the cell are mounted on walls or ceilings.
     pub(crate) hangs: bool,
     pub(crate) sources: &'a Sources,
     pub(crate) past: &'a EarlierPoints<'a>,
@@ -61,7 +61,7 @@ pub(crate) struct BothScans<'a> {
     pub(crate) library: &'a PreparedLibrary<'a>,
 }
 
-/// All that is asked while a cell is compared.
+/// Views and ground of both sessions, with which a cell is compared.
 pub(crate) struct CellComparison<'a> {
     pub(crate) sources: &'a Sources,
     pub(crate) past: &'a EarlierPoints<'a>,
@@ -72,55 +72,56 @@ pub(crate) struct CellComparison<'a> {
     pub(crate) settings: &'a Settings,
     pub(crate) cell: Region,
     pub(crate) library: &'a PreparedLibrary<'a>,
-    /// What the earlier scans cover, as far as they are asked.
+    /// Coverage of those earlier scans that are looked up.
     pub(crate) old_ground: Ground,
-    /// What the new scans and the earlier ones saw of the cell.
+    /// Views of the cell from the new scans.
     pub(crate) new_views: Vec<View>,
+    /// Views of the cell from the earlier scans.
     pub(crate) old_views: Vec<View>,
 }
 
 /// Robots of the plant after the comparison.
 #[derive(Default)]
 pub(crate) struct ComparedRobots {
-    /// By place among the fits: seen as they stand now.
+    /// Indices of fits that the new scans have found.
     pub(crate) in_cell: Vec<usize>,
-    /// Stand otherwise, are of another model, or are new; or stand nobody knows how.
+    /// Indices of fits that have moved, have another model, are new, or are lost.
     pub(crate) changed: Vec<usize>,
-    /// Those of them of which the new scans contradict how they stood.
+    /// Indices of those of them whose earlier posture the new scans contradict.
     pub(crate) contradicted: Vec<usize>,
-    /// Those of which the new scans contradict that and show no other posture.
+    /// Indices of lost robots: the new scans contradict the earlier posture and show no other one.
     pub(crate) lost: Vec<usize>,
-    /// Are gone.
+    /// Indices of robots that are gone.
     pub(crate) gone: Vec<usize>,
-    /// The new scans saw too little of them; and those of them that label points by how they
-    /// stood.
+    /// Indices of robots of which the new scans see too little.
     pub(crate) unseen: Vec<usize>,
+    /// Indices of those of them that label points by their earlier posture.
     pub(crate) as_it_stood: Vec<usize>,
-    /// Bounds of robots as they stood that do no longer stand so.
+    /// Bounds of the earlier postures of robots that no longer stand so, world frame, metres.
     pub(crate) left: Vec<Aabb>,
-    /// Robots that the earlier result missed, though its scans show them; and how they stood then.
+    /// Robots that the earlier result missed, though its scans show them, with their earlier fits.
     pub(crate) missed: Vec<(usize, Fit)>,
 }
 
 impl ComparedRobots {
-    /// All that were compared, by place.
+    /// Indices of all compared robots.
     pub(crate) fn compared(&self) -> BTreeSet<usize> {
         self.in_cell.iter().chain(&self.changed).chain(&self.gone).copied().collect()
     }
 }
 
-/// Labels and differences.
+/// Labels of the new points, and changed bodies.
 pub(crate) struct CellLabels {
     pub(crate) near: NearRobots,
-    pub(crate) compared: Compared,
+    pub(crate) compared: ComparedPoints,
     pub(crate) things: Vec<Thing>,
-    /// What stood in the cell and was not looked at.
+    /// Earlier surfaces of the cell that no new beam has reached.
     pub(crate) unseen: Vec<UnobservedRegion>,
-    /// What stands in the cell now.
+    /// Occupancy of the cell in the new session.
     pub(crate) now: SessionOccupancy,
 }
 
-/// Bounds of the cell that is meant.
+/// Bounds of the requested cell, world frame, metres.
 pub(crate) fn bounds(
     wish: &Cell,
     base: &EarlierResult,
@@ -154,36 +155,36 @@ pub(crate) fn bounds(
                 out.add(at.add_scalar(radius).into());
             }
             if out.is_empty() {
-                return usage("the new scans have no scanner: say which cell with --cell".into());
+                return usage("the new scans have no known scanner position, so the cell must be given with --cell".into());
             }
             out
         }
     };
     let cell = cell.shared(&all);
     if cell.is_empty() {
-        return usage("the new scans have no point in the cell".into());
+        return usage("none of the new scans has a point in the cell".into());
     }
     Ok(cell)
 }
 
-/// What robots of the plant filled, world, metres.
-pub(crate) fn stood(robots: FittedRobots<'_>) -> Vec<Aabb> {
+/// Bounds of all robots in their earlier postures, world frame, metres.
+pub(crate) fn earlier_bounds(robots: FittedRobots<'_>) -> Vec<Aabb> {
     let FittedRobots { fits, models } = robots;
     let all = fits.iter().filter(|fit| fit.verdict != Verdict::Refused);
     all.map(|fit| standing(fit, &models[fit.model])).collect()
 }
 
-/// Robots of the plant that reach into the cell, by place among the fits, and what they filled.
-fn here(robots: FittedRobots<'_>, cell: &Aabb) -> Vec<(usize, Aabb)> {
+/// Indices and bounds of robots that reach into the cell.
+fn robots_in(robots: FittedRobots<'_>, cell: &Aabb) -> Vec<(usize, Aabb)> {
     let FittedRobots { fits, models } = robots;
     let bounds = |(i, fit): (usize, &Fit)| (i, standing(fit, &models[fit.model]));
     let all = fits.iter().enumerate().filter(|(_, fit)| fit.verdict != Verdict::Refused);
     all.map(bounds).filter(|(_, bounds)| bounds.touches(cell)).collect()
 }
 
-/// Their models, with tools.
-pub(crate) fn known<'f>(robots: FittedRobots<'f>, cell: &Aabb) -> BTreeSet<&'f str> {
-    let here = here(robots, cell).into_iter().map(|(i, _)| &robots.fits[i]);
+/// Names of the models of the robots in the cell, with their tools.
+pub(crate) fn model_names<'f>(robots: FittedRobots<'f>, cell: &Aabb) -> BTreeSet<&'f str> {
+    let here = robots_in(robots, cell).into_iter().map(|(i, _)| &robots.fits[i]);
     let names = here.flat_map(|fit| {
         let tool = fit.tool.as_ref().map(|tool| tool.model.as_str());
         [fit.model_name.as_str()].into_iter().chain(tool)
@@ -191,7 +192,8 @@ pub(crate) fn known<'f>(robots: FittedRobots<'f>, cell: &Aabb) -> BTreeSet<&'f s
     names.collect()
 }
 
-/// Lays the new scans on what stood in the cell; returns how far each was off.
+/// Registers the new scans to the earlier surfaces of the cell; returns the correction of each
+/// scan.
 pub(crate) fn register(
     past: &EarlierPoints<'_>,
     new: &Store,
@@ -210,7 +212,7 @@ pub(crate) fn register(
 }
 
 impl<'a> CellComparison<'a> {
-    /// Looks at the cell through earlier and new scans.
+    /// Computes views and ground of the cell from earlier and new scans.
     pub(crate) fn new(
         both: BothScans<'a>,
         settings: &'a Settings,
@@ -223,7 +225,7 @@ impl<'a> CellComparison<'a> {
             cluster::split(&ground.surfaces.occupancy, &ground.surfaces.floor, &settings.cluster);
         let cell = region(&past.cell.center(), &past.cell);
         let fine = ViewSettings { min_cell: LOOK_CELL, ..settings.view.clone() };
-        let old_ground = asked(past, scans.len());
+        let old_ground = earlier_coverage(past, scans.len());
         let old = Search::new(library, scans, past.store, &old_ground, settings);
         let new = Search::new(library, scans, store, &ground, settings);
         let views = engine
@@ -247,7 +249,7 @@ impl<'a> CellComparison<'a> {
         })
     }
 
-    /// What the new scans say of places.
+    /// Look-up in the new scans.
     pub(crate) fn watch(&self) -> VisibilityQuery<'_> {
         VisibilityQuery::new(&self.cell, &self.new_views)
     }
@@ -257,7 +259,7 @@ impl<'a> CellComparison<'a> {
         Search::new(self.library, &self.sources.scans, self.store, &self.ground, self.settings)
     }
 
-    /// How the robots of the cell stand now, and what else differs; fits are brought up to date.
+    /// Compares robots and other bodies of the cell; the fits in `plant` are brought up to date.
     pub(crate) fn compare(
         &self,
         plant: &mut RobotList,
@@ -278,7 +280,7 @@ impl<'a> CellComparison<'a> {
         let (search, watch) = (self.search(), self.watch());
         let old_watch = VisibilityQuery::new(&self.cell, &self.old_views);
         let regions = base_search::regions(&self.clusters, &self.settings.region);
-        let here = here(plant.view(), &self.past.cell);
+        let here = robots_in(plant.view(), &self.past.cell);
         let seen = Observed {
             search: &search,
             watch: &watch,
@@ -287,20 +289,20 @@ impl<'a> CellComparison<'a> {
         };
         let RobotList { fits, models } = plant;
         let looked = engine.fan_out(Task::new("fit").large(), here.clone(), |(i, _)| {
-            look(&fits[i], models, &seen)
+            compare_robot(&fits[i], models, &seen)
         })?;
         for ((i, bounds), (now, own)) in here.into_iter().zip(looked) {
-            let is_anew = matches!(now, Now::Anew(..));
-            if matches!(now, Now::Anew(_, true)) {
+            let is_anew = matches!(now, RobotState::Anew(..));
+            if matches!(now, RobotState::Anew(_, true)) {
                 out.contradicted.push(i);
             }
             match now {
-                Now::Unseen => {
+                RobotState::Unseen => {
                     out.unseen.push(i);
                     out.as_it_stood.push(i);
                 }
-                Now::Open => out.unseen.push(i),
-                Now::Found(mut fit) | Now::Anew(mut fit, _) => {
+                RobotState::Open => out.unseen.push(i),
+                RobotState::Found(mut fit) | RobotState::Anew(mut fit, _) => {
                     if let Some(own) = own {
                         fit.model = models.len();
                         models.push(own);
@@ -312,14 +314,14 @@ impl<'a> CellComparison<'a> {
                     }
                     fits[i] = *fit;
                 }
-                Now::Gone => {
+                RobotState::Gone => {
                     out.gone.push(i);
                     out.left.push(bounds);
                     verdict::apply(&mut fits[i], &VerdictEvent::Gone);
                 }
-                // Labels by a posture that is none could take a fixed thing for a link: it gives
-                // none.
-                Now::Lost => {
+                // A lost robot gives no labels, since a wrong posture could label fixed points as
+                // links.
+                RobotState::Lost => {
                     out.changed.push(i);
                     out.lost.push(i);
                     out.left.push(bounds);
@@ -330,7 +332,7 @@ impl<'a> CellComparison<'a> {
         Ok(out)
     }
 
-    /// Labels of the new points, and what stands elsewhere than it did.
+    /// Labels of the new points, and bodies that have changed.
     fn labels(
         &self,
         plant: FittedRobots<'_>,
@@ -342,7 +344,7 @@ impl<'a> CellComparison<'a> {
         let near = labelling.near_robots(self.store, engine)?;
         let (watch, old_watch) = (self.watch(), VisibilityQuery::new(&self.cell, &self.old_views));
         let missed = self.missed(plant, robots, engine)?;
-        let compared = self.past.look([&watch, &old_watch], missed.as_ref(), engine)?;
+        let compared = self.past.look_up([&watch, &old_watch], missed.as_ref(), engine)?;
         let then = &compared.then;
         let present = NewPoints {
             scans: &self.sources.scans,
@@ -364,7 +366,7 @@ impl<'a> CellComparison<'a> {
         Ok(CellLabels { near, compared, things, unseen, now })
     }
 
-    /// The fits; those that the new scans have no say in give no labels here.
+    /// The fits for labelling; robots that the new scans do not see give no labels.
     pub(crate) fn own_fits(&self, fits: &[Fit], robots: &ComparedRobots) -> Vec<Fit> {
         let mut own = fits.to_vec();
         for (i, fit) in own.iter_mut().enumerate() {
@@ -384,8 +386,8 @@ impl<'a> CellComparison<'a> {
         Labelling::new(robots, &scans, self.settings)
     }
 
-    /// By scan: what carries it from its frame into the plant's and takes back how far it was off,
-    /// where its file states coordinates of the world.
+    /// For each scan whose file states world coordinates, the pose that carries it to the plant's
+    /// frame and corrects its registration.
     pub(crate) fn moved(
         &self,
         registered: &[Option<Registration>],
@@ -401,8 +403,8 @@ impl<'a> CellComparison<'a> {
     }
 }
 
-/// What the new scans cover and what they found occupied; with their walls where those are asked
-/// for, and all of their planes where the plant has no floor.
+/// Coverage and occupancy of the new scans; on request with walls, and with all planes where the
+/// plant has no floor.
 pub(crate) fn ground(
     floor: &Floor,
     with_walls: bool,
@@ -420,8 +422,8 @@ pub(crate) fn ground(
     Ok(ground)
 }
 
-/// What the earlier scans cover, as far as they are asked.
-fn asked(past: &EarlierPoints<'_>, n_scans: usize) -> Ground {
+/// Coverage of those earlier scans that are looked up.
+fn earlier_coverage(past: &EarlierPoints<'_>, n_scans: usize) -> Ground {
     let mut n_points = vec![0_u64; n_scans];
     for &i in &past.store.touching(&past.cell) {
         let entry = &past.store.entries()[i];

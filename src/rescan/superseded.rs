@@ -1,40 +1,40 @@
-//! Places of a mask in, from any thread and in any order; how many they are, and all of them in
-//! order, out.
+//! The set of superseded places of a mask: places are added from any thread in any order, and
+//! listed in ascending order.
 
 use contract::Result;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Places that are handed on together.
+/// Number of places that are listed at a time.
 const PART: usize = 1 << 16;
 
-/// Places of one mask, one bit each: millions of them are in order without being sorted, and take
-/// an eighth of a byte a point.
+/// Places of one mask, one bit each: millions of them are listed in order without sorting, with an
+/// eighth of a byte per point.
 pub(crate) struct Places {
-    /// Of the mask.
+    /// Number of points of the mask.
     n_points: u64,
     words: OnceLock<Vec<AtomicU64>>,
 }
 
 impl Places {
-    /// None of a mask of so many points.
+    /// An empty set for a mask with `n_points` points.
     pub(crate) fn of(n_points: u64) -> Self {
         Self { n_points, words: OnceLock::new() }
     }
 
-    /// Adds places of which many are neighbours.
+    /// A handle for adding places, fast for neighbouring ones.
     pub(crate) fn adding(&self) -> Adding<'_> {
         let n_words = self.n_points.div_ceil(64);
         let words = self.words.get_or_init(|| (0..n_words).map(|_| AtomicU64::new(0)).collect());
         Adding { words, at: 0, bits: 0 }
     }
 
-    /// How many they are.
+    /// Number of places in the set.
     pub(crate) fn len(&self) -> u64 {
         self.words().map(|(_, word)| u64::from(word.count_ones())).sum()
     }
 
-    /// Hands on all of them, ascending, some at a time.
+    /// Passes all places to `take`, ascending, some at a time.
     pub(crate) fn each(&self, mut take: impl FnMut(&[u64]) -> Result<()>) -> Result<()> {
         let mut part = Vec::with_capacity(PART + 64);
         for (at, mut left) in self.words() {
@@ -57,7 +57,7 @@ impl Places {
     }
 }
 
-/// Places that are being added: those of one word together.
+/// Handle for adding places; bits of one word are collected and set together.
 pub(crate) struct Adding<'a> {
     words: &'a [AtomicU64],
     at: usize,
@@ -77,7 +77,7 @@ impl Adding<'_> {
     }
 
     fn flush(&mut self) {
-        // A place beyond the mask has no label, and is none of its points.
+        // A place beyond the mask has no label and is not one of its points.
         if let (bits @ 1.., Some(word)) = (std::mem::take(&mut self.bits), self.words.get(self.at))
         {
             word.fetch_or(bits, Ordering::Relaxed);

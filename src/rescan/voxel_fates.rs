@@ -1,31 +1,30 @@
-//! What the new scans say of each old point in a cell in; by voxel, whether all of its points stay
-//! or all of them go, out: where one or the other is so, the records of those points need not be
-//! asked for one by one again.
+//! Fates of the earlier points of a cell by voxel: where all points of a voxel stay or all are
+//! superseded, its records need not be looked up again one by one.
 
 use change::SessionOccupancy;
 use freespace::Visibility;
 use geometry::Aabb;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Most voxels that are kept, one byte each: 30 x 30 x 9 m. Of larger cells each point is asked for
+/// Most voxels of the table, one byte each: 30 x 30 x 9 m. In larger cells every point is looked up
 /// again.
 const MAX_VOXELS: usize = 1 << 26;
-/// A point in the voxel stays; the new scans measured what one is of; they saw through the place of
-/// one.
+/// Bits of a voxel: one of its points stays; new scans measured the surface of one again; new beams
+/// passed through one.
 const STAYS: u8 = 1;
 const ONTO: u8 = 2;
 const THROUGH: u8 = 4;
 
-/// Fates of the old points by voxel ([`SessionOccupancy::cell`]).
+/// Fates of earlier points by voxel ([`SessionOccupancy::cell`]).
 pub(crate) struct Fates {
     first: [i32; 3],
     size: [usize; 3],
-    /// x fastest.
+    /// Bits of each voxel, x fastest.
     voxels: Vec<AtomicU8>,
 }
 
 impl Fates {
-    /// None known yet.
+    /// A table for a cell, without known fates.
     pub(crate) fn of(cell: &Aabb) -> Self {
         let (first, last) = (SessionOccupancy::cell(cell.min), SessionOccupancy::cell(cell.max));
         let n = |i: usize| i64::from(last[i]) - i64::from(first[i]) + 1;
@@ -35,7 +34,7 @@ impl Fates {
         Self { first, size, voxels: (0..n).map(|_| AtomicU8::new(0)).collect() }
     }
 
-    /// Says what the new scans have at an old point's place.
+    /// Adds the visibility of an earlier point in the new scans.
     #[inline]
     pub(crate) fn add(&self, voxel: [i32; 3], sight: Visibility) {
         let fate = match sight {
@@ -50,8 +49,8 @@ impl Fates {
         }
     }
 
-    /// Whether all points of a voxel stay, or none; `is_gone`: what stood in it is no longer there.
-    /// `None` where that depends on the point.
+    /// Whether all points of a voxel stay (`true`) or none does (`false`); `None` where it depends
+    /// on the point. `is_gone` tells whether the body in the voxel is gone.
     pub(crate) fn stays(&self, voxel: [i32; 3], is_gone: impl Fn() -> bool) -> Option<bool> {
         let fate = self.at(voxel)?.load(Ordering::Relaxed);
         let through = match fate & THROUGH {

@@ -1,32 +1,32 @@
-//! A run that found no robot in; what its clouds and library lack for one, and what supplying it
-//! would change, out.
+//! Advice for a run that found no robot: what scans and library lack, and what supplying it would
+//! change.
 
 use crate::store::TileEntry;
 use contract::{Scan, quote};
 use geometry::Aabb;
 use robot::Model;
 
-/// Points of a square metre of surface below which robots are often missed: of twelve arms that a
-/// camera showed in 1,400 to 2,800 points, about as many a square metre, four were found
+/// Density below which robots are often missed, points per square metre of surface: of twelve arms
+/// that a camera showed in 1,400 to 2,800 points, about as many per square metre, four were found
 /// (benches/README.md, Depth cameras).
 const SPARSE: f64 = 2_800.0;
-/// Names of scans that a sentence lists.
+/// Most names of scans that a sentence lists.
 const N_NAMES: usize = 3;
 
-/// What a run had to go by.
-pub(crate) struct Lack<'a> {
+/// Scans, tiles and models of a run that found no robot.
+pub(crate) struct SearchInputs<'a> {
     /// Scans with points.
     pub(crate) scans: &'a [&'a Scan],
-    /// Where their points lie.
+    /// Catalogue entries of their tiles.
     pub(crate) tiles: &'a [TileEntry],
     /// Models of the library.
     pub(crate) models: &'a [Model],
-    /// Places as large as a robot that were searched.
+    /// Number of regions that were searched.
     pub(crate) n_places: usize,
 }
 
-impl Lack<'_> {
-    /// One sentence for each thing that is missing or may be.
+impl SearchInputs<'_> {
+    /// One sentence for each input that is missing or may be missing.
     pub(crate) fn advice(&self) -> Vec<String> {
         let mut out: Vec<String> =
             [self.of_models(), self.of_positions(), self.of_cameras(), self.of_density()]
@@ -105,7 +105,7 @@ impl Lack<'_> {
     }
 }
 
-/// Names in one phrase: the first few, and how many more there are.
+/// Names as one phrase: the first few, and the number of the others.
 fn listed(names: Vec<&str>) -> String {
     let mut words: Vec<String> =
         names.iter().take(N_NAMES).map(|name| format!("'{}'", quote::shown(name))).collect();

@@ -1,23 +1,23 @@
-//! A thing that appeared, went or moved in; its entry in `changes.json` and a line for people out.
+//! Entries of `changes.json` for bodies that appeared, went or moved, and their lines for people.
 
 use change::{Thing, ThingChange};
 use contract::words::{fixed, triple};
 use geometry::Aabb;
 use serde::{Deserialize, Serialize};
 
-/// A thing as `changes.json` has it.
+/// A body that changed, as an entry of `changes.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ThingEntry {
     /// `appeared`, `gone` or `moved`.
     pub(crate) change: String,
-    /// Corners of its bounds before and now, world, metres.
+    /// Corners of its bounds before and now, world frame, metres.
     pub(crate) then: Option<[[f64; 3]; 2]>,
     pub(crate) now: Option<[[f64; 3]; 2]>,
-    /// Middle now less middle then, metres, where it moved.
+    /// Shift of the middle of its bounds, metres, where it moved.
     pub(crate) shift: Option<[f64; 3]>,
     /// Volume of the voxels that changed, m³.
     pub(crate) volume_m3: f64,
-    /// Points in them.
+    /// Number of points in these voxels.
     pub(crate) n_points: u64,
 }
 
@@ -34,7 +34,7 @@ impl ThingEntry {
         }
     }
 
-    /// A line for people; it is the `k`th, from 0 on.
+    /// A line for people; `k` is its index, from 0.
     pub(crate) fn words(&self, k: usize) -> String {
         let [min, max] = self.now.or(self.then).unwrap_or_default();
         let size = [0, 1, 2].map(|i| fixed(max[i] - min[i], 2)).join(" x ");
@@ -44,7 +44,7 @@ impl ThingEntry {
     }
 }
 
-/// What became of a thing, in one word.
+/// The change of a body, as a word.
 pub(crate) fn word(change: ThingChange) -> &'static str {
     match change {
         ThingChange::Appeared => "appeared",

@@ -1,8 +1,8 @@
-//! Two results of one plant in; which robots stand otherwise, came, went or were exchanged, out.
+//! Compares two results of one plant: which robots moved, appeared, are gone or were exchanged.
 //!
-//! A change within what both results know of a value is none: a joint has moved where its values
-//! differ by more than five of their standard deviations together, and by more than models and
-//! registration make. Joints that the points of either session leave open are not compared, and
+//! A difference within the uncertainty of both results is not a change: a joint has moved where its
+//! values differ by more than five of their combined standard deviations, and by more than errors
+//! of models and registration. Joints that are undetermined in either session are not compared, but
 //! named.
 
 use contract::words::{Unit, triple};
@@ -12,86 +12,87 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-/// Robots nearer than this are one place, metres: no two feet stand so near.
+/// Distance below which two bases are at the same place, metres: no two feet stand so close
+/// together.
 const SAME_PLACE: f64 = 0.5;
-/// Standard deviations of a difference from which on it is one: of a plant's hundreds of joints
-/// none by chance.
+/// Number of standard deviations from which on a difference is a change: among a plant's hundreds
+/// of joints none exceeds it by chance.
 const SURE: f64 = 5.0;
 /// Least difference of a joint that counts, radians (0.1°) or metres.
 const LEAST_JOINT: f64 = 0.001_75;
-/// Joints of two trusted postures that are known less well than joints ought to be, and have no
-/// other values, radians: up to this standard deviation (2°) they tell a change of at least so much
-/// (2°).
+/// Largest standard deviation of a roughly known joint of a trusted posture, radians (2°), and the
+/// least change of such a joint that counts.
 const ROUGH: f64 = 0.035;
-/// Least shift of a base that counts, metres: two sessions are registered to within millimetres.
+/// Least shift of a base that counts, metres: sessions are registered to each other within
+/// millimetres.
 const LEAST_SHIFT: f64 = 0.010;
 /// Least turn of a base that counts, radians (0.15°).
 const LEAST_TURN: f64 = 0.002_6;
 
-/// What became of one robot.
+/// Change of one robot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Change {
-    /// Stands as it stood, as far as both results tell.
+    /// Base and joints are the same as far as both results determine them.
     Same,
-    /// Joints or base differ.
+    /// Joints or base have moved.
     Moved,
-    /// Another model stands in its place.
+    /// Another model stands at its place.
     Exchanged {
-        /// Model before.
+        /// Name of the earlier model.
         was: String,
     },
-    /// Only in the second result.
+    /// The robot is only in the second result.
     Appeared,
-    /// Only in the first result.
+    /// The robot is only in the first result.
     Gone,
 }
 
-/// A joint then and now.
+/// A joint in both results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct JointChange {
-    /// As in the URDF.
+    /// Name of the joint in the URDF.
     pub joint: String,
-    /// Value and standard deviation then, radians or metres.
+    /// Value and standard deviation in the first result, radians or metres.
     pub then: [f64; 2],
-    /// Value and standard deviation now.
+    /// Value and standard deviation in the second result, radians or metres.
     pub now: [f64; 2],
-    /// Now less then; whole turns taken off.
+    /// Second value less first one, without whole turns, radians or metres.
     pub change: f64,
-    /// Whether it is one, beyond what both know.
+    /// Whether the difference is a change, beyond the uncertainty of both results.
     pub is_change: bool,
     /// Whether the joint slides: its values are metres.
     pub slides: bool,
 }
 
-/// One robot of either result.
+/// The comparison of one robot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RobotChange {
     /// Its id in the first result.
     pub then: Option<String>,
-    /// The first result has it not, though its scans show it.
+    /// Whether the first result has missed it, though the scans of that session show it.
     pub was_missed: bool,
-    /// Its id in the second.
+    /// Its id in the second result.
     pub now: Option<String>,
-    /// Model now, or then if it is gone.
+    /// Its model in the second result, or in the first one if it is gone.
     pub model: String,
-    /// What became of it.
+    /// Its change.
     pub change: Change,
-    /// Shift of its base, metres, world axes.
+    /// Shift of its base along the world axes, metres.
     pub base_shift: Option<[f64; 3]>,
     /// Turn of its base, radians.
     pub base_turn: Option<f64>,
-    /// Joints that both results determine, and those known roughly that differ by far more than
-    /// that.
+    /// Joints that both results determine, and roughly known joints whose difference far exceeds
+    /// their uncertainty.
     pub joints: Vec<JointChange>,
-    /// Joints that one of them leaves open.
+    /// Names of joints that are undetermined in one of the results.
     pub not_compared: Vec<String>,
-    /// Verdicts then and now.
+    /// Verdicts in both results.
     pub verdicts: [Option<String>; 2],
 }
 
-/// Compares two results: robots of the first in its order, then those that appeared. Refused ones
-/// stand in neither.
+/// Compares two results: robots of the first result in its order, followed by those that appeared.
+/// Refused robots are left out.
 #[must_use]
 pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
     let standing = |result| -> Vec<&RobotEntry> {
@@ -124,12 +125,13 @@ pub fn changes(then: &ResultFile, now: &ResultFile) -> Vec<RobotChange> {
     known.chain(new.map(|(b, _)| alone(b, Change::Appeared))).collect()
 }
 
-/// Whether a robot stands otherwise, or is known better.
+/// Whether a robot has changed or has a better verdict.
 pub(crate) fn stands_otherwise(then: &Fit, now: &Fit) -> bool {
     now.verdict > then.verdict || of_fits("", then, now).change != Change::Same
 }
 
-/// A robot that the first result missed, though its scans show how it stood.
+/// The comparison of a robot that the first result missed, though its scans show the posture
+/// `then`.
 pub(crate) fn of_missed(id: &str, then: &Fit, now: &Fit) -> RobotChange {
     RobotChange { then: None, was_missed: true, ..of_fits(id, then, now) }
 }
@@ -140,7 +142,7 @@ fn of_fits(id: &str, then: &Fit, now: &Fit) -> RobotChange {
 }
 
 impl Change {
-    /// In one word.
+    /// The change as a word.
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self {
@@ -213,13 +215,13 @@ fn compared(a: &RobotEntry, b: &RobotEntry) -> RobotChange {
     out
 }
 
-/// Value and standard deviation of a joint that a result determines.
+/// Value and standard deviation of a joint, if the result determines it.
 fn known(robot: &RobotEntry, name: &str) -> Option<[f64; 2]> {
     let determined = robot.determined.0.iter().find(|(n, _)| n == name).is_none_or(|(_, d)| *d);
     value(robot, name).filter(|_| determined)
 }
 
-/// The same then and now of a joint that turns and that two trusted postures know roughly.
+/// Values and standard deviations of a turning joint that both trusted postures know roughly.
 fn rough(then: &RobotEntry, now: &RobotEntry, name: &str) -> Option<[[f64; 2]; 2]> {
     let is_one = |r: &RobotEntry| {
         r.verdict == Verdict::Trusted.word()
@@ -260,7 +262,8 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The changes in words, a robot a paragraph; those that stand as they stood in a line each.
+/// The changes as text for people: a paragraph for each changed robot, a line for each unchanged
+/// one.
 #[must_use]
 pub fn words(changes: &[RobotChange]) -> String {
     let mut text = String::new();

@@ -1,5 +1,5 @@
-//! A result that is whole in; its points in another format out, in `OUT/export`. The next run into
-//! OUT takes away what is true of its points no longer, and says so.
+//! Converts the points of a published result to another format, in `OUT/export`. The next run into
+//! OUT removes converted files whose points have changed, and reports it.
 
 use super::copc;
 use crate::cache::{EXPORT, VerifiedFiles, copc_name};
@@ -10,27 +10,26 @@ use contract::{Error, Kind, Result};
 use export::{PLY, write_ply};
 use std::path::{Path, PathBuf};
 
-/// What points can be written as.
+/// Formats that points can be converted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
-    /// One LAZ of all points, as an octree that viewers load piece by piece (Potree, QGIS)
+    /// One LAZ file of all points, as an octree that viewers load piece by piece (Potree, QGIS)
     Copc,
-    /// Two PLY files: what moves, and what stands still (Open3D, MeshLab)
+    /// Two PLY files: moving points and fixed points (Open3D, MeshLab)
     Ply,
 }
 
-/// Writes the points of the result in `out`; the files' paths.
+/// Converts the points of the result in `out` and returns the paths of the files.
 ///
 /// # Errors
-/// No result, or one without tiles; another run at work in it; files that cannot be read or
+/// There is no result, it has no tiles, another run uses the folder, or files cannot be read or
 /// written.
 pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBuf>> {
     let files = VerifiedFiles::open(out)?;
-    // A result that was copied without its store has nobody at work in it.
+    // No run can use a result that was copied without its store.
     let _lock = out.join("store").is_dir().then(|| Job::hold(out)).transpose()?;
     let into = without_links(out, EXPORT)?;
-    // Tiles as the list has them, each compared with it: what else lies in their folder is none of
-    // the result.
+    // Only tiles that the manifest lists are read, and each is compared with it.
     let listed = files.manifest().files.iter().map(|file| &*file.path);
     let listed = listed.filter(|path| path.starts_with("tiles/")).collect();
     let tiles = engine.fan_out("compare", listed, |name: &str| files.compared(name))?;

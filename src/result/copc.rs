@@ -1,4 +1,4 @@
-//! The tiles of a result in; one COPC file of all their points out, its steps told as those of the
+//! Writes one COPC file of all points of a result's tiles, with its steps shown as stages of the
 //! run.
 
 use crate::engine::progress::{Progress, Stage};
@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Writes the file `to` of some tiles, if there are any, and says whether; `scratch` is a folder
-/// that is taken away at the end, however that comes.
+/// Writes the COPC file `to` from these tiles; returns false where there are none. The folder
+/// `scratch` is removed at the end, also after an error.
 ///
 /// # Errors
-/// Files that cannot be read or written; a run that is cancelled.
+/// Files that cannot be read or written, or a cancelled run.
 pub(crate) fn write(tiles: &[PathBuf], to: &Path, scratch: &Path, engine: &Engine) -> Result<bool> {
     let steps = Arc::new(Steps {
         progress: engine.progress.clone(),
@@ -24,12 +24,12 @@ pub(crate) fn write(tiles: &[PathBuf], to: &Path, scratch: &Path, engine: &Engin
     engine.cancel.check()?;
     let write = || guarded("copc", 0, || export::write_copc(tiles, to, scratch, &steps));
     let written = engine.pool()?.install(write);
-    // Of the disk only, and what is left is taken away by the next run.
+    // Remaining files only cost space; the next run removes them.
     let _ = std::fs::remove_dir_all(scratch);
     written
 }
 
-/// Steps of the conversion as stages of the run.
+/// Shows the steps of the conversion as stages of the run.
 struct Steps {
     progress: Progress,
     cancel: Cancel,

@@ -1,6 +1,6 @@
-//! A folder of results in; which sessions of a plant lie in it, which goes on from which, and how
-//! much room each takes by itself, out. Results share files that are the same, so that any of them
-//! can be taken away without harm to the others.
+//! Lists the results in a folder: sessions of a plant, the session that each one started from, and
+//! the space of each. Results share identical files as hard links, so any result can be removed
+//! without harm to the others.
 
 use crate::cache::{Manifest, VerifiedFiles};
 use crate::io::own_paths::refuse_link;
@@ -13,33 +13,34 @@ use std::fmt::Write as _;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
-/// One result.
+/// One result in the folder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlantSession {
     /// Name of its folder.
     pub name: String,
-    /// The session that it goes on from, where that lies here, too.
+    /// Name of the session that it started from, where that is in the folder.
     pub base: Option<String>,
-    /// Scan files, of all sessions up to this one.
+    /// Number of scan files of all sessions up to this one.
     pub n_inputs: usize,
-    /// Robots that stand.
+    /// Number of reported robots.
     pub n_robots: usize,
-    /// Bytes of its files and its store, and those of them that no other session shares.
+    /// Size of its files and its store, bytes.
     pub n_bytes: u64,
-    /// See `n_bytes`.
+    /// Size of those files that no other session shares, bytes.
     pub n_own_bytes: u64,
 }
 
-/// What lies in a folder.
+/// All results in a folder.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SessionHistory {
-    /// Each after the one that it goes on from, then by name.
+    /// Sessions, each after the one that it started from, then by name.
     pub sessions: Vec<PlantSession>,
-    /// Results that are not what was written, in words.
+    /// Messages about damaged results.
     pub damaged: Vec<String>,
 }
 
-/// The sessions below a folder. Links in it are not followed: what they lead to lies elsewhere.
+/// Lists the sessions in a folder. Symbolic links in it are not followed, since their targets lie
+/// elsewhere.
 ///
 /// # Errors
 /// A folder that cannot be read.
@@ -76,7 +77,7 @@ pub fn sessions(folder: &Path) -> Result<SessionHistory> {
         })
         .collect();
     let mut out: Vec<PlantSession> = Vec::new();
-    // Roots first; what goes on from nothing that is listed, as after a removal, is a root, too.
+    // Roots first. A session whose base is not listed, as after a removal, is a root, too.
     while !left.is_empty() {
         let is_next = |s: &PlantSession| {
             s.base.as_ref().is_none_or(|base| out.iter().any(|o| o.name == *base))
@@ -87,12 +88,12 @@ pub fn sessions(folder: &Path) -> Result<SessionHistory> {
     Ok(SessionHistory { sessions: out, damaged })
 }
 
-/// The error for a folder that holds no results.
+/// The error for a folder without results.
 #[must_use]
 pub fn no_results(folder: &Path) -> Error {
     Error::bad_input("there is no result in this folder")
         .at(folder.display())
-        .hint("give the folder that output folders of runs lie in")
+        .hint("give the folder that contains the output folders of runs")
 }
 
 fn session(path: &Path, name: String, result: &ResultFile) -> Result<PlantSession> {
@@ -116,7 +117,7 @@ fn session(path: &Path, name: String, result: &ResultFile) -> Result<PlantSessio
     Ok(PlantSession { name, base: None, n_inputs, n_robots, n_bytes, n_own_bytes })
 }
 
-/// Under how many names a file is known.
+/// Number of hard links of a file.
 #[cfg(unix)]
 fn n_names(meta: &Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::nlink(meta)
@@ -127,11 +128,11 @@ fn n_names(_: &Metadata) -> u64 {
     1
 }
 
-/// Takes a session away. What others share with it stays theirs. A name is the name of a folder and
-/// nothing else, and a link is not followed.
+/// Removes a session. Files that other sessions share stay with them. The name must be the plain
+/// name of a folder, and a symbolic link is not followed.
 ///
 /// # Errors
-/// No result of that name, a link, a result at which a run is at work, or what the system refuses.
+/// There is no result of that name, it is a symbolic link, a run uses it, or the system refuses.
 pub fn remove(folder: &Path, name: &str) -> Result<()> {
     let path: PathBuf = folder.join(name);
     let is_name = Path::new(name).file_name().is_some_and(|own| own == name);
@@ -145,9 +146,10 @@ pub fn remove(folder: &Path, name: &str) -> Result<()> {
             .at(folder.display())
             .hint("`stillpoint history` lists them; --remove takes a name from that list"));
     }
-    // A result that was copied without its store has nobody at work in it.
+    // No run can use a result that was copied without its store.
     let lock = path.join("store").is_dir().then(|| Job::hold(&path)).transpose()?;
-    // Without its list it is no result any more, however far the rest of this comes.
+    // The manifest is removed first: without it the folder is no result any more, even if the rest
+    // fails.
     let failed = |e: std::io::Error| Error::from(e).at(path.display());
     let without = |name: &str| match std::fs::remove_file(path.join(name)) {
         Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(failed(e)),
@@ -156,7 +158,7 @@ pub fn remove(folder: &Path, name: &str) -> Result<()> {
     without("result.json")?;
     without("manifest.json")?;
     drop(lock);
-    // Of links in it the links go, not what they lead to.
+    // Symbolic links are removed, not their targets.
     std::fs::remove_dir_all(&path).map_err(failed)
 }
 

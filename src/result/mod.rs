@@ -1,5 +1,5 @@
-//! What a run found in; the result as files and words, what a later session goes on from, and how
-//! results differ, follow one another and are converted, out.
+//! Results as files and words: `result.json` and the summary, the state for later sessions, changes
+//! between results, their history and their conversion.
 
 pub(crate) mod advice;
 pub(crate) mod changed_things;

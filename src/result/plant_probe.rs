@@ -1,5 +1,5 @@
-//! A door for the fuzz targets: the body of a plant's file in, whether a rescan would go on from
-//! it, out.
+//! Access for the fuzz targets: decodes the body of a `plant.bin`, and tells whether a rescan would
+//! accept it.
 
 use super::plant_state::{FORMAT, PlantState, Records};
 use crate::cache::written;
@@ -8,7 +8,7 @@ use export::{LasSettings, Quantum};
 use geometry::Pose;
 use std::path::Path;
 
-/// A file of the format, with the digest of this body.
+/// A complete file with this body and its digest.
 pub(crate) fn file(body: &[u8]) -> Vec<u8> {
     [FORMAT, blake3::hash(body).as_bytes(), body].concat()
 }
@@ -45,7 +45,7 @@ pub(crate) fn body() -> Vec<u8> {
     written(&state).map_or_else(Vec::new, |bytes| bytes[32..].to_vec())
 }
 
-/// Reads the file of a folder; all numbers in it must name what is there.
+/// Reads the file in a folder; all indices in it must be valid.
 pub(crate) fn read(out: &Path) -> Result<()> {
     let state = PlantState::parse(&std::fs::read(out.join("plant.bin"))?)?;
     assert_eq!(state.tiles.len(), state.inputs.len(), "tiles of each input");

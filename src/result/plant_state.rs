@@ -1,5 +1,5 @@
-//! What a run leaves for a later session of its plant, and that again: `plant.bin` beside the
-//! result.
+//! The state of a plant for later sessions: `plant.bin` beside the result holds scans, floor,
+//! robots and keys of tiles.
 
 use crate::cache::{Key, VerifiedFiles, read, written};
 use contract::{Error, Fit, Floor, Input, Kind, Mask, Result, Scan};
@@ -11,31 +11,31 @@ use std::path::{Path, PathBuf};
 
 /// Name of the file.
 const NAME: &str = "plant.bin";
-/// What the file begins with: its format.
+/// First bytes of the file: name and version of its format.
 pub(super) const FORMAT: &[u8] = b"stillpoint.plant/6\n";
 
-/// Scans, floor and robots of a plant as a run found them.
+/// Scans, floor and robots of a plant as a run has found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct PlantState {
     pub(crate) inputs: Vec<Input>,
     pub(crate) masks: Vec<Mask>,
     pub(crate) scans: Vec<Scan>,
-    /// Tiles of each input, by the name of their folder in the store.
+    /// Key of the tiles of each input: the name of their folder in the store.
     pub(crate) tiles: Vec<Key>,
-    /// By input: what carried its scans into the plant's frame, where their files state another
-    /// one.
+    /// For each input, the pose that carried its scans to the plant's frame, where its files are in
+    /// another one.
     pub(crate) frames: Vec<Option<Pose>>,
-    /// Digest of what each of these stores holds (see `Store::contents`).
+    /// Digest of the content of each of these stores (see `Store::contents`).
     pub(crate) contents: Vec<String>,
     pub(crate) floor: Floor,
-    /// In the order of the result; robots that are gone are refused.
+    /// Fits in the order of the result; robots that are gone are refused.
     pub(crate) fits: Vec<Fit>,
-    /// The library, as it was given.
+    /// Path of the robot library as it was given.
     pub(crate) robots: PathBuf,
     pub(crate) records: Records,
 }
 
-/// How clouds are written.
+/// Layout of the records of clouds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Records {
     scale: [f64; 3],
@@ -43,7 +43,7 @@ pub(crate) struct Records {
     with_color: bool,
     with_bodies: bool,
     compress: bool,
-    /// Edge of the spatial tiles, metres, where there are any.
+    /// Edge of the spatial tiles, metres; `None` without tiles.
     tile_edge: Option<f64>,
 }
 
@@ -69,7 +69,7 @@ impl Records {
         }
     }
 
-    /// The same for what is written beside them.
+    /// Settings for clouds that are written beside the present ones.
     pub(crate) fn export(&self, settings: &export::Settings) -> export::Settings {
         export::Settings {
             tiles: self.tile_edge.is_some(),
@@ -81,23 +81,24 @@ impl Records {
         }
     }
 
-    /// Edge of the spatial tiles, metres, where there are any.
+    /// Edge of the spatial tiles, metres; `None` without tiles.
     pub(crate) fn tile_edge(&self) -> Option<f64> {
         self.tile_edge
     }
 }
 
 impl PlantState {
-    /// Writes it beside a result.
+    /// Writes the state beside a result.
     pub(crate) fn write(&self, out: &Path) -> Result<()> {
-        let body = written(self).ok_or_else(|| Error::new(Kind::Bug, "a plant cannot be kept"))?;
+        let body = written(self)
+            .ok_or_else(|| Error::new(Kind::Bug, "the state of the plant cannot be encoded"))?;
         export::atomic::write(&out.join(NAME), &[FORMAT, &body].concat())
     }
 
-    /// That of a result.
+    /// Reads the state of a result.
     ///
     /// # Errors
-    /// There is none, or it is not what was written.
+    /// There is none, it was changed, or another version wrote it.
     pub(crate) fn read(files: &VerifiedFiles) -> Result<Self> {
         Self::parse(&files.bytes(NAME)?).map_err(|e| e.at(NAME))
     }
@@ -111,13 +112,12 @@ impl PlantState {
         if state.is_consistent() {
             Ok(state)
         } else {
-            Err(bad("its numbers contradict one another"))
+            Err(bad("its inputs, masks and scans are numbered inconsistently"))
         }
     }
 
-    /// Whether inputs, masks and scans are numbered in their order and name one another, and clouds
-    /// have a scale: the digest guards against damage, not against another program that writes
-    /// such a file.
+    /// Whether inputs, masks and scans are numbered in order and refer to each other, and clouds
+    /// have a scale. The digest detects damage, but not another program that writes such a file.
     fn is_consistent(&self) -> bool {
         let (inputs, masks, scans) = (&self.inputs, &self.masks, &self.scans);
         let is_number = |id: u32, at: usize| id as usize == at;
@@ -139,7 +139,7 @@ impl PlantState {
             && offset.iter().all(|v| v.is_finite())
     }
 
-    /// Its inputs, for new ones to be numbered after them.
+    /// Its inputs, after which new inputs are numbered.
     pub(crate) fn before(&self) -> Before {
         let (inputs, masks, scans) = (self.inputs.clone(), self.masks.clone(), self.scans.clone());
         Before { inputs, masks, scans }
@@ -199,7 +199,7 @@ mod tests {
             let error = read_back(&state).expect_err("refused").to_string();
             assert!(error.contains("contradict"), "{i}: {error}");
         }
-        // A key is the name of a folder in the store, and nothing else.
+        // A key must be the plain name of a folder in the store.
         let foreign = written(&vec!["../../elsewhere".to_owned()]).expect("is written");
         assert!(read::<Vec<Key>>(&foreign).is_none());
         let own = written(&whole.tiles).expect("is written");

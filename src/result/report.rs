@@ -1,6 +1,6 @@
-//! What a run came to in; `result.json`, the legend of the masks and a summary for people out.
+//! Writes `result.json`, the legend of the masks, and the summary for people.
 
-use super::advice::Lack;
+use super::advice::SearchInputs;
 use crate::cache::{Digests, OutputDir};
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
@@ -19,24 +19,24 @@ use ingest::{MISPLACED, Sources};
 use robot::{JointKind, Library, Model, Motion, Role};
 use std::fmt::Write as _;
 
-/// Everything that the result tells.
+/// Everything that `result.json` and the summary are made of.
 pub(crate) struct Report<'a> {
     pub(crate) digests: &'a Digests,
     pub(crate) sources: &'a Sources,
     pub(crate) store: &'a Store,
     pub(crate) library: &'a Library,
     pub(crate) robots: FittedRobots<'a>,
-    /// Bodies above the floor, and the places about them that were searched for robots.
+    /// Number of clusters, and of regions that were searched for robots.
     pub(crate) n_searched: [usize; 2],
     pub(crate) written: &'a WrittenLabels,
-    /// What each entry of the review did.
+    /// Effect of each entry of the review.
     pub(crate) review: Vec<ReviewEntry>,
-    /// Inputs and regions that failed and were left out.
+    /// Messages about inputs and regions that failed and were left out.
     pub(crate) left_out: Vec<String>,
 }
 
 impl Report<'_> {
-    /// Writes the legend and the result, last of all files.
+    /// Writes the legend and the result, as the last of all files.
     pub(crate) fn finish(&self, output: &OutputDir) -> Result<Outcome> {
         let robots: Vec<RobotEntry> = self
             .robots
@@ -76,7 +76,7 @@ impl Report<'_> {
         Ok(Outcome { summary: self.summary(), warnings, partial, ..Outcome::default() })
     }
 
-    /// Counts of each stage; no times, so that the same input gives the same bytes.
+    /// Counts of each stage, without times, so that the same input gives the same bytes.
     fn stages(&self) -> Vec<StageEntry> {
         let n_points = self.written.masks.iter().map(|m| m.n_points).sum();
         let entry =
@@ -89,14 +89,14 @@ impl Report<'_> {
         ]
     }
 
-    /// The scans with points: of a large LAZ file it is not known beforehand whether any are of no
-    /// scanner that is given.
+    /// Scans with points: for a large LAZ file it is not known in advance whether it has points
+    /// without a known scanner.
     fn scans(&self) -> impl Iterator<Item = &Scan> {
         let has_points = |scan: &&Scan| self.store.entries().iter().any(|e| e.at.scan == scan.id);
         self.sources.scans.iter().filter(has_points)
     }
 
-    /// Why models of the library could not be loaded.
+    /// Findings about models that could not be loaded.
     fn models_left_out(&self) -> impl Iterator<Item = &robot::Finding> {
         self.library.findings.iter().filter(|f| f.severity == robot::Severity::Error)
     }
@@ -114,7 +114,7 @@ impl Report<'_> {
         }));
         out.extend(dropped(self.sources, &self.written.masks));
         for scan in self.scans().filter(|s| !s.has_beams()) {
-            // A position that was given and is not used says why.
+            // A given position that is not used has a note with the reason.
             let why = scan.notes.iter().find(|note| note.contains(MISPLACED));
             let why = why.map_or("its scanner's position is not known", String::as_str);
             let name = quote::shown(&scan.name);
@@ -124,13 +124,14 @@ impl Report<'_> {
             let scans: Vec<&Scan> = self.scans().collect();
             let (tiles, models) = (self.store.entries(), &self.library.models[..]);
             out.extend(
-                Lack { scans: &scans, tiles, models, n_places: self.n_searched[1] }.advice(),
+                SearchInputs { scans: &scans, tiles, models, n_places: self.n_searched[1] }
+                    .advice(),
             );
         }
         out
     }
 
-    /// Value and standard deviation of each joint.
+    /// Appends value and standard deviation of each joint.
     fn say_posture(&self, text: &mut String, fit: &Fit) {
         let model = &self.robots.models[fit.model];
         for (joint, &index) in fit.joints.iter().zip(&model.free) {
@@ -199,15 +200,15 @@ impl Report<'_> {
     }
 }
 
-/// A joint as the summary has it: name, value, standard deviation, and a word where it is not
-/// determined.
+/// A line of the summary for a joint: name, value, standard deviation, and a word where it is not
+/// determined well.
 fn joint_line(joint: &JointFit, slides: bool) -> String {
     let unit = Unit::of(slides);
     let (value, sigma) = (unit.say(joint.value, 3), unit.deviation(joint.sigma));
     format!("{:<24} {value:>11} ± {sigma}{}", quote::shown(&joint.name), joint.certainty.note())
 }
 
-/// The entry of a robot in the result; `models` are those that fits are of.
+/// The entry of a robot in the result; `models` are the models that fits refer to.
 pub(crate) fn robot_entry(
     index: usize,
     fit: &Fit,
@@ -218,12 +219,12 @@ pub(crate) fn robot_entry(
     let names: Vec<String> = model.links.iter().map(|l| l.name.clone()).collect();
     let tip = tip(model).map(|l| (names[l].clone(), poses(fit, model)[l]));
     let mut entry = RobotEntry { space, ..RobotEntry::new(&robot_id(index), fit, &names, tip) };
-    stand(&mut entry, fit, models);
+    add_link_poses(&mut entry, fit, models);
     entry
 }
 
-/// Says where the links of a robot stand, and of the same robot in other scans.
-fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
+/// Adds the poses of the links, also of the same robot in other scans.
+fn add_link_poses(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
     let model = &models[fit.model];
     let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
     let joints = model.joints.iter().zip(model.joint_values(&posture));
@@ -235,11 +236,11 @@ fn stand(entry: &mut RobotEntry, fit: &Fit, models: &[Model]) {
     let links = model.links.iter().zip(poses(fit, model));
     entry.link_poses = NamedMap(links.map(|(l, pose)| (l.name.clone(), (&pose).into())).collect());
     for (entry, stay) in entry.stays.iter_mut().zip(&fit.stays) {
-        stand(entry, stay, models);
+        add_link_poses(entry, stay, models);
     }
 }
 
-/// What is said of masks of the open inputs whose points were dropped in part.
+/// Warnings about masks of the open inputs with dropped points.
 pub(crate) fn dropped(sources: &Sources, counts: &[MaskCount]) -> Vec<String> {
     let masks = sources.opened_masks().iter().zip(counts).filter(|(_, count)| count.n_dropped > 0);
     let say = |(mask, count): (&Mask, &MaskCount)| {
@@ -252,7 +253,7 @@ pub(crate) fn dropped(sources: &Sources, counts: &[MaskCount]) -> Vec<String> {
     masks.map(say).collect()
 }
 
-/// The entry of an input in the result; `counts` of the masks of the inputs that are open.
+/// The entry of an input in the result; `counts` are those of the masks of all open inputs.
 pub(crate) fn input_entry(
     sources: &Sources,
     input: &Input,

@@ -1,30 +1,31 @@
-//! Points of one tile as they come in; what of them waits in memory and what went to disk, out.
+//! The buffer of one tile while the store is filled: its points in memory, and what was already
+//! written to disk.
 
 use super::catalogue::TileEntry;
 use super::record::Record;
 use super::spill::Segment;
 use contract::TileAt;
 
-/// Most points of one tile: bounds what a worker holds. A square of ground of a dense cloud, or a
-/// lattice far coarser than its scan, may have more; then several tiles stand at the same
-/// [`TileAt`], cut in the order of places.
+/// Most points of one tile; this bounds the memory of a worker. A ground square of a dense cloud,
+/// or a pixel raster far coarser than its scan, may have more points; then several tiles share the
+/// same [`TileAt`], divided in the order of places.
 pub const TILE_POINTS: usize = 1 << 21;
 
-/// What is known of a tile.
+/// Points and disk segments of one tile.
 pub(super) struct Buffer {
     pub(super) at: TileAt,
-    /// In memory.
+    /// Records in memory.
     pub(super) records: Vec<Record>,
-    /// In the spill file.
+    /// Segments in the spill file.
     pub(super) segments: Vec<Segment>,
-    /// In the tile file, as the end knows it.
+    /// Tiles already written to the tile file.
     pub(super) written: Vec<TileEntry>,
     pub(super) is_written: bool,
-    /// All that came so far.
+    /// Number of all points received so far.
     pub(super) n_points: usize,
     last_place: u64,
     pub(super) ascending: bool,
-    /// Number of the last strip that had points for it.
+    /// Number of the last strip that had points for this tile.
     pub(super) touched: u64,
 }
 
@@ -44,7 +45,7 @@ impl Buffer {
     }
 
     pub(super) fn add(&mut self, records: &[Record]) {
-        // Within a run places ascend, as they do in strips.
+        // Places ascend within a run of records, as they do in strips.
         let (Some(first), Some(last)) = (records.first(), records.last()) else { return };
         self.ascending &= self.n_points == 0 || first.place() > self.last_place;
         self.last_place = last.place();
@@ -52,8 +53,9 @@ impl Buffer {
         self.records.extend_from_slice(records);
     }
 
-    /// Makes room for `n` more points, at first for `usual`; bytes that this takes. It grows by a
-    /// quarter: what waits is most of the memory of a run.
+    /// Reserves room for `n` more points, at first for `usual` points, and returns the bytes that
+    /// this takes. The room grows by a quarter, since waiting points are most of the memory of a
+    /// run.
     pub(super) fn make_room(&mut self, n: usize, usual: usize) -> usize {
         let (len, before) = (self.records.len(), self.records.capacity());
         if len + n > before {
@@ -63,12 +65,12 @@ impl Buffer {
         (self.records.capacity() - before) * Record::BYTES
     }
 
-    /// Whether some of it was brought to disk before.
+    /// Whether part of the tile was written to disk before.
     pub(super) fn comes_back(&self) -> bool {
         self.is_written || !self.segments.is_empty()
     }
 
-    /// Whether all of it is written.
+    /// Whether all points of the tile are written.
     pub(super) fn is_done(&self) -> bool {
         self.records.is_empty() && self.segments.is_empty()
     }

@@ -1,8 +1,9 @@
-//! The catalogue: entries of all tiles in, a checked file out, and back.
+//! The catalogue of a store: the entries of all tiles, written to and read from a file with a
+//! checksum.
 //!
-//! A header of 64 bytes (magic 8, version u32, zero u32, length of the archive u64, its BLAKE3 32,
-//! zeros), then an `rkyv` archive of exactly that length, and nothing more: `rkyv` may read
-//! trailing bytes as another answer.
+//! The file has a header of 64 bytes (magic 8, version u32, zero u32, length of the archive u64,
+//! its BLAKE3 digest 32, zeros), then an `rkyv` archive of exactly that length and nothing more,
+//! since `rkyv` may read trailing bytes as another archive.
 
 use super::layout::{ALIGN, layout};
 use super::record::N_LEVELS;
@@ -12,41 +13,41 @@ use geometry::Aabb;
 use rkyv::{Archive, Deserialize, Serialize};
 use std::path::Path;
 
-/// Name of the catalogue in the folder of a store.
+/// Name of the catalogue file in the folder of a store.
 pub(super) const CATALOGUE: &str = "catalogue.rkyv";
-/// Name of the file of all tiles.
+/// Name of the file that holds all tiles.
 pub(super) const TILES: &str = "tiles.bin";
 /// Length of the header of both files, bytes.
 pub(super) const HEADER_BYTES: u64 = 64;
-/// Grows with any change of either file.
+/// Version of both formats; increased with every change of either.
 const VERSION: u32 = 2;
 const CATALOGUE_MAGIC: &[u8; 8] = b"STILLCAT";
 const TILES_MAGIC: &[u8; 8] = b"STILLTIL";
 
-/// What the catalogue says of one tile.
+/// Entry of one tile in the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TileEntry {
-    /// Where it lies.
+    /// Scan, row and column of the tile.
     pub at: TileAt,
     /// Number of points.
     pub n_points: u64,
-    /// Smallest place in the mask of its points.
+    /// Smallest place (index in the mask) of its points.
     pub first_place: u64,
-    /// Bounds of its points in the world, metres.
+    /// Bounds of its points in the world frame, metres.
     pub bounds: Aabb,
-    /// About four of five of its points are no farther than this from the origin of their scan,
-    /// metres; 0 where it has but few.
+    /// Distance from the origin of the scan within which about four fifths of its points lie,
+    /// metres; 0 for a tile with few points.
     pub range: f32,
-    /// Where its bytes begin in the tile file.
+    /// Offset of its bytes in the tile file.
     pub(super) offset: u64,
-    /// Points of each level, coarsest first …
+    /// Number of points of each level, coarsest level first.
     pub(super) n_of: [u32; N_LEVELS],
-    /// … and CRC-32C of its bytes.
+    /// CRC-32C of the bytes of each level.
     pub(super) checksums: [u32; N_LEVELS],
 }
 
 impl TileEntry {
-    /// Length of its coarsest levels, bytes.
+    /// Length of its `n_levels` coarsest levels, bytes.
     pub(super) fn n_bytes(&self, n_levels: usize) -> u64 {
         self.n_of.iter().take(n_levels).map(|n| layout(u64::from(*n))[3]).sum()
     }
@@ -62,7 +63,7 @@ impl Weigh for TileEntry {
     }
 }
 
-/// A [`TileEntry`] in the archive.
+/// A [`TileEntry`] as it is archived.
 #[derive(Archive, Serialize, Deserialize)]
 struct TileRow {
     at: [u32; 3],
@@ -75,10 +76,10 @@ struct TileRow {
     bounds: [[f64; 3]; 2],
 }
 
-/// All of the archive.
+/// Content of the archive.
 #[derive(Archive, Serialize, Deserialize)]
 struct Rows {
-    /// Length of the tile file.
+    /// Length of the tile file, bytes.
     n_tile_bytes: u64,
     rows: Vec<TileRow>,
 }
@@ -91,8 +92,8 @@ pub(super) fn tiles_header() -> [u8; HEADER_BYTES as usize] {
     header
 }
 
-/// Writes the catalogue of a tile file that is `n_tile_bytes` long. Scans are numbered from the
-/// `first` of the store: in another run the same store may hold others.
+/// Writes the catalogue of a tile file of `n_tile_bytes` bytes. Scans are numbered from the `first`
+/// scan of the store, since another run may number them differently.
 pub(super) fn write(
     path: &Path,
     entries: &[TileEntry],
@@ -124,8 +125,8 @@ pub(super) fn write(
     atomic::write(path, &bytes)
 }
 
-/// Digest of what some tiles of one store hold, wherever that lies; scans are numbered from their
-/// first.
+/// Digest of the content of some tiles of one store, independent of its folder; scans are numbered
+/// from the store's first scan.
 pub(super) fn digest(entries: &[TileEntry]) -> String {
     let first = entries.first().map_or(0, |e| e.at.scan.0);
     let mut hasher = blake3::Hasher::new();
@@ -143,15 +144,15 @@ pub(super) fn digest(entries: &[TileEntry]) -> String {
     format!("blake3:{}", hasher.finalize().to_hex())
 }
 
-/// Reads and checks a catalogue whose scans are numbered from `first`; gives the entries and the
+/// Reads and checks a catalogue whose scans are numbered from `first`; returns the entries and the
 /// length of the tile file.
 pub(super) fn read(path: &Path, first: u32) -> Result<(Vec<TileEntry>, u64)> {
-    let bytes =
-        std::fs::read(path).map_err(|e| Error::of_read("the catalogue cannot be read", path, e))?;
+    let bytes = std::fs::read(path)
+        .map_err(|e| Error::of_read("the catalogue of the store cannot be read", path, e))?;
     let (mut entries, n) = parse(&bytes).map_err(|e| e.at(path.display()))?;
     for entry in &mut entries {
         let Some(scan) = entry.at.scan.0.checked_add(first) else {
-            return Err(broken("the catalogue contradicts itself").at(path.display()));
+            return Err(broken("the catalogue of the store is inconsistent").at(path.display()));
         };
         entry.at.scan = ScanId(scan);
     }
@@ -164,16 +165,16 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
         return torn("the catalogue is shorter than its header");
     };
     if header[..8] != *CATALOGUE_MAGIC {
-        return torn("this is no catalogue of a store");
+        return torn("this file is not the catalogue of a store");
     }
     if header[8..16] != (u64::from(VERSION)).to_le_bytes() {
-        return torn("the catalogue has another version");
+        return torn("the catalogue was written by another version of the store");
     }
     if header[16..24] != (archive.len() as u64).to_le_bytes() {
-        return torn("the catalogue is torn: its length is not what it says");
+        return torn("the catalogue is truncated: its length differs from its header");
     }
     if header[24..56] != *blake3::hash(archive).as_bytes() || header[56..] != [0; 8] {
-        return torn("the catalogue is damaged: its digest is not what it says");
+        return torn("the catalogue is damaged: its digest differs from its header");
     }
     let mut aligned = rkyv::util::AlignedVec::<64>::with_capacity(archive.len());
     aligned.extend_from_slice(archive);
@@ -186,7 +187,7 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
         let sorted = entries.last().is_none_or(|e| (e.at, e.first_place) < (at, row.first_place));
         let n_points: u64 = row.n_of.iter().map(|n| u64::from(*n)).sum();
         if !sorted || row.n_points != n_points || !row.offset.is_multiple_of(ALIGN) {
-            return torn("the catalogue contradicts itself");
+            return torn("the catalogue of the store is inconsistent");
         }
         entries.push(TileEntry {
             at,
@@ -199,8 +200,8 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
             checksums: row.checksums,
         });
     }
-    // In the order of the file no tile begins before the one before it ends; gaps are tiles that
-    // were written twice.
+    // Tiles must not overlap in the file. Gaps are allowed: they belong to tiles that were written
+    // twice.
     let mut spans: Vec<(u64, u64)> =
         entries.iter().map(|e| (e.offset, e.n_bytes(N_LEVELS))).collect();
     spans.sort_unstable();
@@ -210,13 +211,13 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
     }
     match end {
         Some(end) if end <= rows.n_tile_bytes => Ok((entries, rows.n_tile_bytes)),
-        _ => torn("the catalogue contradicts itself"),
+        _ => torn("the catalogue of the store is inconsistent"),
     }
 }
 
-/// An error about a store that cannot be used.
+/// The error for a store that cannot be used.
 pub(super) fn broken(what: impl Into<String>) -> Error {
-    Error::bad_input(what).hint("remove the store; it is made again from the scans")
+    Error::bad_input(what).hint("remove the store; the next run makes it again from the scans")
 }
 
 #[cfg(test)]

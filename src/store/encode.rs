@@ -1,8 +1,8 @@
-//! Points of one tile in, its bytes on disk and its catalogue entry out; and back.
+//! Encoding of the points of one tile to bytes and a catalogue entry, and decoding.
 //!
-//! By level, coarsest first, three little-endian arrays, each padded with zeros to 64 bytes: xyz
-//! (f32 × 3), place (u32, less the tile's first place), pixel (u16). Who can do with a part of a
-//! dense tile reads its beginning.
+//! Each level, coarsest first, has three little-endian arrays, each padded with zeros to 64 bytes:
+//! xyz (f32 × 3, scan frame, metres), place (u32, less the tile's first place), pixel (u16). A
+//! reader that needs only part of a dense tile reads its first levels.
 
 use super::catalogue::TileEntry;
 use super::layout::{blocks, layout};
@@ -18,7 +18,7 @@ pub(super) struct Encode {
     world_from_scan: Vec<Pose>,
 }
 
-/// A tile as it goes to disk; the entry's offset is still to be set.
+/// An encoded tile; the offset of its entry is set when it is written.
 pub(super) struct Encoded {
     pub(super) entry: TileEntry,
     pub(super) bytes: Vec<u8>,
@@ -65,7 +65,7 @@ impl Map for Encode {
 }
 
 impl Encode {
-    /// The tile of some points, its bytes in memory that was used before.
+    /// Encodes the points of a part into `bytes`, memory that is used again.
     pub(super) fn encode(
         &self,
         part: &mut TilePart,
@@ -108,13 +108,13 @@ impl Encode {
     }
 }
 
-/// Points whose range tells how far a tile is.
+/// Number of points whose range is looked at to estimate the range of a tile.
 const PROBES: usize = 64;
-/// Share of them that are no farther.
+/// Share of the points that lie within the range of a tile.
 const NEARER: f64 = 0.8;
 
-/// How far most records are from the origin of their scan, metres; 0 where they are too few to
-/// tell.
+/// Distance from the origin of the scan within which [`NEARER`] of the records lie, metres; 0 for
+/// few records.
 fn range(records: &[Record]) -> f32 {
     let step = (records.len() / PROBES).max(1);
     let range = |r: &Record| r.xyz.iter().map(|v| v * v).sum::<f32>().sqrt();
@@ -126,8 +126,8 @@ fn range(records: &[Record]) -> f32 {
     *ranges.select_nth_unstable_by(at, f32::total_cmp).1
 }
 
-/// The points of a level of a tile in its (aligned) bytes, which have the length that [`layout`]
-/// says.
+/// The points of a level of a tile, borrowed from its aligned bytes, whose length is that of
+/// [`layout`].
 pub(super) fn points<'a>(entry: &TileEntry, level: usize, bytes: &'a [u8]) -> TilePoints<'a> {
     let n = entry.n_of[level] as usize;
     let [_, place, pixel, _] = layout(n as u64).map(|v| v as usize);
@@ -141,8 +141,8 @@ pub(super) fn points<'a>(entry: &TileEntry, level: usize, bytes: &'a [u8]) -> Ti
     }
 }
 
-/// The coarsest levels of a tile, so many as lie in its (aligned) bytes, copied out and sorted by
-/// pixel.
+/// Copies the coarsest levels of a tile, as many as `bytes` (aligned) holds, and sorts their points
+/// by pixel.
 pub(super) fn decode(entry: &TileEntry, n_levels: usize, bytes: &[u8]) -> Tile {
     let blocks = blocks(&entry.n_of);
     let levels: Vec<TilePoints<'_>> =
@@ -158,7 +158,7 @@ pub(super) fn decode(entry: &TileEntry, n_levels: usize, bytes: &[u8]) -> Tile {
         skip: (N_LEVELS - n_levels) as u32,
         n_all: entry.n_points,
     };
-    // A counting sort. Points of one pixel are of one level, in the order of their places.
+    // A counting sort. All points of a pixel are in one level, in the order of their places.
     let mut next = vec![0_u32; N_PIXELS];
     levels.iter().flat_map(|level| level.pixel).for_each(|pixel| next[usize::from(*pixel)] += 1);
     let mut sum = 0;

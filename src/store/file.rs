@@ -1,5 +1,5 @@
-//! Encoded tiles in, one after the other in a file, out; and tiles of it back while it is still
-//! being written.
+//! The tile file while a store is filled: encoded tiles are appended, and can be read back before
+//! the file is complete.
 
 use super::catalogue;
 use super::catalogue::TileEntry;
@@ -11,14 +11,14 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// The tile file of a sink. A tile that was written too early and is written again leaves a gap.
+/// The tile file of a sink. A tile that was written early and is written again leaves a gap.
 pub(super) struct TileFile {
     file: AtomicFile,
     path: PathBuf,
     len: u64,
 }
 
-/// The same file, to read what was written so far.
+/// The same file, opened to read tiles that were written so far.
 pub(super) struct Early {
     file: File,
     path: PathBuf,
@@ -32,7 +32,7 @@ impl TileFile {
         Ok(Self { file, path: path.to_owned(), len: catalogue::HEADER_BYTES })
     }
 
-    /// Appends a tile; returns its entry.
+    /// Appends a tile and returns its catalogue entry.
     pub(super) fn append(&mut self, encoded: &Encoded) -> Result<TileEntry> {
         let entry = TileEntry { offset: self.len, ..encoded.entry };
         self.len += encoded.bytes.len() as u64;
@@ -47,7 +47,7 @@ impl TileFile {
         Ok(Early { file: self.file.again().map_err(failed)?, path: self.path.clone() })
     }
 
-    /// Gives the file its name; returns its length.
+    /// Gives the file its final name and returns its length, bytes.
     pub(super) fn commit(self) -> Result<u64> {
         self.file.commit()?;
         Ok(self.len)
@@ -55,7 +55,7 @@ impl TileFile {
 }
 
 impl Early {
-    /// The bytes of a tile.
+    /// Reads the bytes of a tile.
     pub(super) fn read(&mut self, entry: &TileEntry) -> Result<Vec<u8>> {
         let mut bytes = vec![0; entry.n_bytes(N_LEVELS) as usize];
         let read = self.file.seek(SeekFrom::Start(entry.offset));

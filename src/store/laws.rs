@@ -1,4 +1,5 @@
-//! The laws of the store for strips drawn at random: what goes in comes out, whatever way it came.
+//! Property tests of the store on random strips: the tiles hold exactly the points that were added,
+//! whatever strips, memory and threads were used.
 
 use super::tests::{build, scans, tiles};
 use super::*;
@@ -6,11 +7,11 @@ use contract::{MaskId, ScanId, Strip};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
-/// Stores that are drawn: each is written to disk twice.
+/// Number of random stores; each is written to disk twice.
 const N_CASES: u32 = 48;
 
-/// Points of one scan by place: places ascend with gaps, coordinates are of a room, of a far one,
-/// or of one spot.
+/// Points of one scan by place. Places ascend with gaps; coordinates fill a room, a distant room,
+/// or a single spot.
 fn points() -> impl Strategy<Value = Vec<(u64, [f32; 3])>> {
     let gap = prop_oneof![8 => Just(1_u64), 2 => 2_u64..50, 1 => Just(1_u64 << 20)];
     let axis = || prop_oneof![4 => -9.0_f32..9.0, 1 => -900.0_f32..900.0, 1 => Just(1.5_f32)];
@@ -25,7 +26,7 @@ fn points() -> impl Strategy<Value = Vec<(u64, [f32; 3])>> {
     })
 }
 
-/// The points of a scan as strips of these lengths, in turn.
+/// Divides the points of a scan into strips of these lengths, in turn.
 fn strips(scan: u32, points: &[(u64, [f32; 3])], lengths: &[usize]) -> Vec<Strip> {
     let mut left = points;
     let mut out = Vec::new();
@@ -68,7 +69,7 @@ proptest! {
         let (second, _) = build(dirs[1].path(), other, budgets[1], n_workers);
         let found = tiles(&first);
         prop_assert!(found == tiles(&second), "strips, budgets or workers change the tiles");
-        // Read back from disk, too.
+        // The store that is read back from disk must be the same.
         let again = Store::open(dirs[0].path(), 0, 1 << 16).expect("opens");
         prop_assert!(found == tiles(&again), "a store is what was written");
         let mut out: [BTreeMap<u64, [u32; 3]>; 3] = Default::default();

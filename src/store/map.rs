@@ -1,13 +1,13 @@
-//! A file of ours in, its bytes in memory out, by the map that inputs are read through: it catches
-//! the signal of a file that is cut short.
+//! A file of the store mapped into memory, by the same kind of map as inputs: it handles the signal
+//! that a truncated file raises.
 
 use contract::{Error, Kind, Result};
 use ingest::Mapped;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A read-only map of a whole file. Pages that were read count as resident, so they are given back
-/// each time `resident_bytes` have been read.
+/// A read-only map of a whole file. Pages that were read count as resident memory, so they are
+/// returned to the system each time `resident_bytes` bytes have been read.
 pub(super) struct FileMap {
     map: Mapped,
     path: PathBuf,
@@ -26,23 +26,22 @@ impl FileMap {
         &self.map
     }
 
-    /// Whether all that was read of it was there; to be asked before what was read is used.
+    /// Checks that all bytes read so far were in the file. Call it before what was read is used.
     pub(super) fn check(&self) -> Result<()> {
         self.map.check().map_err(|_| {
-            let what = "the tiles of the store were cut short or went away while they were read";
+            let what = "the tile file of the store was truncated or removed while it was read";
             Error::new(Kind::BadInput, what)
                 .at(self.path.display())
-                .hint("start the same run again: it makes them anew from the scans")
+                .hint("start the same run again: it makes the tiles again from the scans")
         })
     }
 
-    /// Has the system read a range that will be asked for soon: page by page it would be read at
-    /// the disk's leisure.
+    /// Asks the system to read ahead a range that will be needed soon.
     pub(super) fn will_need(&self, start: usize, n: usize) {
         self.map.will_need(start, n);
     }
 
-    /// To be told after `n` bytes were read.
+    /// Counts `n` bytes as read.
     pub(super) fn has_read(&self, n: usize) {
         if self.read_bytes.fetch_add(n, Ordering::Relaxed) + n < self.resident_bytes {
             return;

@@ -1,5 +1,6 @@
-//! The store: strips in, tiles on disk, tiles out again in any order. A folder with two files: the
-//! catalogue, and the tiles, memory-mapped. Knows no geometry beyond bounds.
+//! The store of lattice tiles on disk. Strips are added in the order of the input, and tiles are
+//! read in any order. A store is a folder with two files: the catalogue, and the memory-mapped
+//! tiles. It knows no geometry beyond bounds.
 
 mod buffer;
 mod catalogue;

@@ -1,5 +1,6 @@
-//! Tiles as they were gathered in, in memory, in the spill file, or written too early; parts of at
-//! most [`TILE_POINTS`] out, whole and in the order of tiles.
+//! Collects the points of each tile from memory, from the spill file and from tiles that were
+//! written early, and returns them in parts of at most [`TILE_POINTS`] points, in the order of
+//! tiles.
 
 use super::buffer::{Buffer, TILE_POINTS};
 use super::encode::decode;
@@ -8,33 +9,33 @@ use super::record::{N_LEVELS, Record, TilePart};
 use super::spill::{Segment, Spill};
 use contract::{Result, TileAt};
 
-/// Longest way from the first to the last place of one tile: places are kept as 32 bits from the
+/// Largest difference between places of one tile: places are stored as 32-bit differences from the
 /// first.
 pub(super) const LONGEST_SPAN: u64 = u32::MAX as u64;
 
-/// From the smallest to the largest place.
+/// Difference between the largest and the smallest place of the records.
 pub(super) fn span(records: &[Record]) -> u64 {
     let places = || records.iter().map(Record::place);
     places().max().zip(places().min()).map_or(0, |(max, min)| max - min)
 }
 
-/// Gives the tiles out, one after the other, each in parts of at most [`TILE_POINTS`].
+/// Iterator over the tiles, each in parts of at most [`TILE_POINTS`] points.
 pub(super) struct Parts {
     buffers: std::vec::IntoIter<Buffer>,
     spill: Option<Spill>,
-    /// Where tiles were written before all of their points had come.
+    /// File of tiles that were written before all of their points had come.
     early: Option<Early>,
     current: Option<Current>,
 }
 
-/// A tile that is being read back.
+/// The tile that is being read back.
 struct Current {
     at: TileAt,
     /// Segments still to be read.
     segments: std::vec::IntoIter<Segment>,
-    /// What was in memory; comes after all segments.
+    /// Records that were in memory; they follow all segments.
     last: Vec<Record>,
-    /// Read, not yet given out.
+    /// Records that were read but not returned yet.
     ahead: Vec<Record>,
 }
 
@@ -75,13 +76,14 @@ impl Parts {
                 let place = tile.first_place + u64::from(tile.place[i]);
                 Record::new(tile.xyz[i], place, tile.pixel[i])
             }));
-            // Tiles are sorted by pixel.
+            // A written tile is sorted by pixel, not by place.
             ascending = false;
         }
         let spill = &mut self.spill;
         let mut current = Current { at, segments: segments.into_iter(), last: records, ahead };
         if !ascending && n_points > TILE_POINTS {
-            // Rare: points out of order, and too many. Their order decides where parts are cut.
+            // Too many points that are out of order, which is rare: the parts are divided by the
+            // order of places.
             current.fill(usize::MAX, spill)?;
             current.ahead.sort_unstable_by_key(Record::place);
         }
@@ -90,7 +92,7 @@ impl Parts {
 }
 
 impl Current {
-    /// Reads until `n` records are ahead, or all.
+    /// Reads until `n` records are in `ahead`, or no more are left.
     fn fill(&mut self, n: usize, spill: &mut Option<Spill>) -> Result<()> {
         while self.ahead.len() < n {
             if let Some(segment) = self.segments.next() {
@@ -108,7 +110,7 @@ impl Current {
         Ok(())
     }
 
-    /// The next part. Within one, places span less than 2³².
+    /// The records of the next part, whose places span less than 2³².
     fn records(&mut self, spill: &mut Option<Spill>) -> Result<Vec<Record>> {
         self.fill(TILE_POINTS, spill)?;
         let mut n = self.ahead.len().min(TILE_POINTS);

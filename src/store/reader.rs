@@ -1,5 +1,5 @@
-//! A folder with catalogue and tiles in; the tiles in any order, each checked once, out. Knows no
-//! geometry beyond bounds.
+//! Reads tiles of one or more store folders in any order. The checksum of each tile is compared
+//! when it is first read.
 
 use super::catalogue::{self, CATALOGUE, TILES, TileEntry, broken};
 use super::encode;
@@ -15,40 +15,42 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Tiles that the system reads ahead of the one that is asked for: some ten megabytes.
+/// Number of tiles that the system reads ahead: some ten megabytes.
 const AHEAD: usize = 8;
-/// A store that is whole: tiles by place, in the order of [`TileAt`], whatever way they came in.
+/// A complete store. Its tiles are sorted by [`TileAt`], then by place, in whatever order the
+/// points came.
 pub struct Store {
     entries: Vec<TileEntry>,
-    /// Which of their levels were read and found whole, a bit each: a tile is read for each region
-    /// that sees it.
+    /// One bit for each level of each tile whose checksum was compared: a tile is read once for
+    /// each region that sees it.
     is_whole: Vec<AtomicU8>,
-    /// Its folders.
+    /// Folders of the store, one for each input.
     folders: Vec<Folder>,
 }
 
-/// One folder.
+/// A folder of the store.
 struct Folder {
-    /// Place of its first entry.
+    /// Index of its first entry.
     first: usize,
-    /// Its file of tiles.
+    /// Path of its tile file.
     path: PathBuf,
-    /// Its tiles, for those that are asked for again and again …
+    /// Its tiles as a memory map, for tiles that are read repeatedly.
     map: FileMap,
-    /// … and to read all of them once.
+    /// Its tile file, to read tiles once past the page cache.
     direct: DirectFile,
 }
 
 impl Store {
-    /// Opens a whole store, its scans numbered from `first`. Mapped pages are given back to the
-    /// system each time `resident_bytes` have been read.
+    /// Opens a complete store whose scans are numbered from `first`. Mapped pages are returned to
+    /// the system each time `resident_bytes` bytes have been read.
     pub fn open(dir: &Path, first: u32, resident_bytes: usize) -> Result<Self> {
         let (entries, n_tile_bytes) = catalogue::read(&dir.join(CATALOGUE), first)?;
         let path = dir.join(TILES);
         let map = FileMap::open(&path, resident_bytes)?;
         let bytes = map.bytes();
         if bytes.len() as u64 != n_tile_bytes || !bytes.starts_with(&catalogue::tiles_header()) {
-            return Err(broken("the tiles are not those of the catalogue").at(path.display()));
+            return Err(broken("the tile file does not belong to the catalogue beside it")
+                .at(path.display()));
         }
         let file = File::open(&path);
         let file = file.map_err(|e| Error::of_read("the tiles cannot be opened", &path, e))?;
@@ -57,7 +59,7 @@ impl Store {
         Ok(Self { entries, is_whole, folders: vec![Folder { first: 0, path, map, direct }] })
     }
 
-    /// Stores of scans that follow one another, as one.
+    /// Joins stores of consecutive scans to one.
     #[must_use]
     pub fn join(stores: Vec<Self>) -> Self {
         let mut all = Self { entries: Vec::new(), is_whole: Vec::new(), folders: Vec::new() };
@@ -74,7 +76,7 @@ impl Store {
         all
     }
 
-    /// Scans were carried by a motion of the world: tiles get bounds that hold their points there.
+    /// Adapts the bounds of all tiles to scans that were moved by `motion` in the world frame.
     pub fn carry(&mut self, motion: &Pose) {
         for entry in &mut self.entries {
             let corners = entry.bounds.corners();
@@ -83,15 +85,15 @@ impl Store {
         }
     }
 
-    /// What is known of each tile without reading it, sorted by [`TileAt`], then by place. Entries
-    /// at the same [`TileAt`] are parts of one tile that would be too large.
+    /// Catalogue entries of all tiles, sorted by [`TileAt`], then by place. Entries with the same
+    /// [`TileAt`] are parts of one tile that would be too large.
     #[must_use]
     pub fn entries(&self) -> &[TileEntry] {
         &self.entries
     }
 
-    /// Of each of its folders a digest of what it holds: points and checksums of all tiles,
-    /// wherever they lie in their file. The same for whatever memory it was filled with.
+    /// A digest of the content of each folder: points and checksums of all tiles, independent of
+    /// their order in the file and of the memory that filled it.
     #[must_use]
     pub fn contents(&self) -> Vec<String> {
         let ends = self.folders.iter().skip(1).map(|part| part.first).chain([self.entries.len()]);
@@ -111,31 +113,30 @@ impl Store {
         self.entries.iter().map(|e| e.n_points).sum()
     }
 
-    /// Tile `i` of [`Store::entries`], copied out, with all of its points or less (see
-    /// [`Tile::skip`]); checked where it is read for the first time.
+    /// A copy of tile `i` of [`Store::entries`], with all of its points or fewer (see
+    /// [`Tile::skip`]). Its checksum is compared when it is first read.
     ///
     /// # Panics
-    /// Where there is no such entry.
+    /// `i` is not the index of an entry.
     pub fn tile(&self, i: usize, skip: u32) -> Result<Tile> {
         let n_levels = n_levels(skip);
         let (part, Range { start, end }) = self.place(i, n_levels);
         let bytes = &part.map.bytes()[start..end];
         let checked = self.check(i, n_levels, bytes);
         let tile = checked.map(|()| encode::decode(&self.entries[i], n_levels, bytes));
-        // A file that was cut short meanwhile says more than the checksum of what was put in its
+        // A truncated file is the better message than the checksum of the zeros that take its
         // place.
         part.map.check()?;
         part.map.has_read(end - start);
         tile
     }
 
-    /// Does something with the points of each of these tiles, with those of a tile level by level,
-    /// the coarsest first; in the given order and without a copy. Levels of less than `skip`
-    /// are not read.
+    /// Calls `work` with the points of each of these tiles, level by level, coarsest first, in the
+    /// given order and without a copy. Levels finer than `skip` are not read.
     ///
     /// # Errors
-    /// A damaged tile; a store that was cut short meanwhile, of which `work` may have seen zeros:
-    /// what it made is of no use.
+    /// A damaged tile, or a store that was truncated meanwhile; `work` may then have seen zeros,
+    /// and its result must be dropped.
     pub fn look_at(
         &self,
         indices: &[usize],
@@ -156,22 +157,22 @@ impl Store {
             {
                 work(&encode::points(entry, level, &bytes[block]));
             }
-            // Tiles whose checksums are known are not summed up again: what was cut off since shows
-            // only here.
+            // Tiles that were compared before are not summed up again, so that a truncation since
+            // then shows only here.
             part.map.check()?;
             part.map.has_read(end - start);
         }
         Ok(())
     }
 
-    /// Compares the bytes of a tile's coarsest levels with their checksums, each once.
+    /// Compares the bytes of a tile's coarsest levels with their checksums, each level once.
     fn check(&self, i: usize, n_levels: usize, bytes: &[u8]) -> Result<()> {
         let (entry, is_whole) = (&self.entries[i], &self.is_whole[i]);
         let known = is_whole.load(Ordering::Relaxed);
         for (level, block) in layout::blocks(&entry.n_of).into_iter().take(n_levels).enumerate() {
             if known & 1 << level == 0 && crc32c::crc32c(&bytes[block]) != entry.checksums[level] {
                 let (at, path) = (entry.at, self.place(i, 0).0.path.display());
-                return Err(broken("the tile is damaged: its checksum is not what it should be")
+                return Err(broken("the tile is damaged: its checksum differs from the catalogue")
                     .at(format!("{path}: scan {}, tile {} {}", at.scan.0, at.row, at.col)));
             }
             is_whole.fetch_or(1 << level, Ordering::Relaxed);
@@ -179,7 +180,7 @@ impl Store {
         Ok(())
     }
 
-    /// Where the bytes of a tile's coarsest levels lie.
+    /// Folder and byte range of a tile's coarsest levels.
     fn place(&self, i: usize, n_levels: usize) -> (&Folder, Range<usize>) {
         let entry = &self.entries[i];
         let part = self.folders.partition_point(|part| part.first <= i);
@@ -192,23 +193,22 @@ impl Store {
         part.map.will_need(start, end - start);
     }
 
-    /// Indices of the tile at `at`: none where it holds no point, mostly one, several where it has
-    /// parts.
+    /// Indices of the tiles at `at`: none where it holds no point, mostly one, several for a tile
+    /// with parts.
     #[must_use]
     pub fn find(&self, at: TileAt) -> Range<usize> {
         let start = self.entries.partition_point(|e| e.at < at);
         start..start + self.entries[start..].partition_point(|e| e.at == at)
     }
 
-    /// Indices of the tiles whose bounds touch `bounds` (world, metres), ascending.
+    /// Indices of the tiles whose bounds touch `bounds` (world frame, metres), ascending.
     #[must_use]
     pub fn touching(&self, bounds: &Aabb) -> Vec<usize> {
         (0..self.entries.len()).filter(|&i| self.entries[i].bounds.touches(bounds)).collect()
     }
 
-    /// All tiles in order, each to be read once, past the system's cache: a source for a pass,
-    /// whose first map is [`Store::reads`]. `skip` says how much of each is left out (see
-    /// [`Tile::skip`]).
+    /// All tiles in order, to be read once past the page cache: the source of a pass whose first
+    /// map is [`Store::reads`]. `skip` says how much of each tile is left out (see [`Tile::skip`]).
     pub fn picks<'s>(
         &'s self,
         skip: impl Fn(&TileEntry) -> u32 + Send + 's,
@@ -217,7 +217,7 @@ impl Store {
         self.entries.iter().enumerate().map(pick)
     }
 
-    /// The same of these tiles.
+    /// Like [`Store::picks`], for these tiles only.
     pub fn picks_once(
         &self,
         indices: Vec<usize>,
@@ -226,8 +226,8 @@ impl Store {
         indices.into_iter().map(move |i| self.pick(i, skip, true))
     }
 
-    /// The same of these tiles, for those that are asked for again and again: the system reads them
-    /// ahead.
+    /// Like [`Store::picks`], for these tiles only, which are read repeatedly: the system reads
+    /// them ahead.
     pub fn picks_again(
         &self,
         indices: Vec<usize>,
@@ -250,13 +250,13 @@ impl Store {
         })
     }
 
-    /// Reads tiles on the workers of a pass.
+    /// The map that reads picked tiles on the workers of a pass.
     #[must_use]
     pub fn reads(&self) -> Reads<'_> {
         Reads(self)
     }
 
-    /// A tile that was picked, checked where it is read for the first time.
+    /// Reads a picked tile and compares its checksum when it is first read.
     pub fn read(&self, pick: &Pick) -> Result<Tile> {
         if !pick.once {
             return self.tile(pick.i, pick.skip);
@@ -266,19 +266,19 @@ impl Store {
         let bytes = part.direct.read(start as u64, end - start);
         let bytes = bytes.map_err(|e| Error::of_read("the tiles cannot be read", &part.path, e))?;
         if bytes.len() < end - start {
-            return Err(broken("the tiles are cut short").at(part.path.display()));
+            return Err(broken("the tile file is truncated").at(part.path.display()));
         }
         self.check(i, n_levels, &bytes)?;
         Ok(encode::decode(&self.entries[i], n_levels, &bytes))
     }
 }
 
-/// A tile that is to be read.
+/// A tile that is to be read by a worker.
 #[derive(Debug, Clone, Copy)]
 pub struct Pick {
     i: usize,
     skip: u32,
-    /// Whether nobody reads it again soon.
+    /// Whether it is read only once, past the page cache.
     once: bool,
     n_points: u64,
     n_bytes: usize,
@@ -294,7 +294,7 @@ impl Weigh for Pick {
     }
 }
 
-/// Picked tiles in, read ones out.
+/// The map from picked tiles to tiles with their points.
 pub struct Reads<'s>(&'s Store);
 
 impl Map for Reads<'_> {
@@ -307,7 +307,7 @@ impl Map for Reads<'_> {
     }
 }
 
-/// Levels that are read where so much is left out.
+/// Number of levels that are read for this `skip`.
 fn n_levels(skip: u32) -> usize {
     (MAX_SKIP - skip.min(MAX_SKIP)) as usize + 1
 }

@@ -1,4 +1,5 @@
-//! A point on its way into a tile: what the spill file holds, 20 bytes a point.
+//! The record of a point on its way into a tile (20 bytes, also in the spill file), and the order
+//! of records within a tile.
 
 use bytemuck::{Pod, Zeroable};
 use contract::{MAX_SKIP, TILE_SIDE, TileAt, Weigh};
@@ -7,19 +8,19 @@ use contract::{MAX_SKIP, TILE_SIDE, TileAt, Weigh};
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct Record {
-    /// Scan frame, metres.
+    /// Coordinates in the scan frame, metres.
     pub(super) xyz: [f32; 3],
     place_low: u32,
     place_high: u16,
-    /// Row·256 + column.
+    /// Pixel within the tile: row · 256 + column.
     pub(super) pixel: u16,
 }
 
 impl Record {
-    /// Bytes of one.
+    /// Length of a record, bytes.
     pub(super) const BYTES: usize = size_of::<Self>();
 
-    /// `place` must lie below 2⁴⁸ (281 000 billion points: no mask is that long).
+    /// A record; `place` must be less than 2⁴⁸ (281 000 billion points: no mask is that long).
     #[inline]
     pub(super) fn new(xyz: [f32; 3], place: u64, pixel: u16) -> Self {
         Self { xyz, place_low: place as u32, place_high: (place >> 32) as u16, pixel }
@@ -32,19 +33,20 @@ impl Record {
     }
 }
 
-/// Levels of a tile, coarsest first: the points of a level and of all before it are those of the
-/// first pixel with points of each square of 2^(number of levels after it) by as many pixels.
+/// Number of levels of a tile, coarsest first. A level and all before it together hold the points
+/// of the first occupied pixel of each square of 2ⁿ × 2ⁿ pixels, n being the number of levels after
+/// it.
 pub(super) const N_LEVELS: usize = MAX_SKIP as usize + 1;
-/// Pixels of a tile.
+/// Number of pixels of a tile.
 pub(super) const N_PIXELS: usize = (TILE_SIDE * TILE_SIDE) as usize;
 
-/// Where each record of a tile goes: into the block of its level, sorted by pixel in a counting
-/// sort, which keeps the order that they have already (that of places).
+/// The position of each record in its tile: the block of its level, sorted by pixel in a counting
+/// sort, which keeps records of a pixel in the order of their places.
 pub(super) struct PixelOrder {
-    /// By pixel: its level, and the place there of its next record.
+    /// Level of each pixel, and the position of its next record there.
     level: Vec<u8>,
     next: Vec<u32>,
-    /// By step above single pixels and by square: whether a pixel with points was met in it.
+    /// For each square size and square: whether an occupied pixel was met in it.
     taken: [Vec<bool>; MAX_SKIP as usize],
 }
 
@@ -57,7 +59,7 @@ impl Default for PixelOrder {
 }
 
 impl PixelOrder {
-    /// Counts the records of one tile; how many of them each level has.
+    /// Counts the records of one tile and returns the number of records of each level.
     pub(super) fn begin(&mut self, records: &[Record]) -> [u32; N_LEVELS] {
         self.next.fill(0);
         self.taken.iter_mut().for_each(|taken| taken.fill(false));
@@ -78,8 +80,8 @@ impl PixelOrder {
         n_of
     }
 
-    /// Of how many squares of growing size, from 2 x 2 pixels on, a pixel is the first that has
-    /// points.
+    /// Number of square sizes, from 2 × 2 pixels upwards, for which this pixel is the first
+    /// occupied one of its square.
     fn n_first(&mut self, pixel: usize) -> usize {
         let side = TILE_SIDE as usize;
         let (row, col) = (pixel / side, pixel % side);
@@ -88,11 +90,11 @@ impl PixelOrder {
             let square = (row >> step) * (side >> step) + (col >> step);
             !std::mem::replace(&mut taken[square], true)
         };
-        // A square that was met lies in larger ones that were.
+        // A square that was met lies within larger squares that were met as well.
         self.taken.iter_mut().enumerate().map(is_first).take_while(|first| *first).count()
     }
 
-    /// Level and place there of the next record; to be asked once for each, in their order.
+    /// Level of the next record and its position there; call it once for each record, in order.
     #[inline]
     pub(super) fn next(&mut self, record: &Record) -> (usize, usize) {
         let pixel = usize::from(record.pixel);
@@ -102,7 +104,7 @@ impl PixelOrder {
     }
 }
 
-/// The points of a tile, or of a part of it that is small enough.
+/// The records of a tile, or of a part of a tile with too many points.
 pub(super) struct TilePart {
     pub(super) at: TileAt,
     pub(super) records: Vec<Record>,
@@ -123,7 +125,7 @@ mod tests {
     use super::*;
     use std::collections::{BTreeMap, BTreeSet};
 
-    /// The level of each of some pixels, by asking each square for its first one.
+    /// The level of each of these pixels, found by asking each square for its first pixel.
     fn levels(pixels: &BTreeSet<u16>) -> BTreeMap<u16, usize> {
         let square = |pixel: u16, step: u32| ((pixel >> 8) >> step, (pixel & 255) >> step);
         let is_first = |pixel: u16, step: u32| {

@@ -1,16 +1,16 @@
-//! Strips in, the same points grouped by tile out: the parallel half of filling the store.
+//! Groups the points of each strip by lattice tile: the parallel half of filling a store.
 
 use super::record::Record;
 use contract::{Lattice, Map, Pixel, Result, Scan, ScanId, Strip, TILE_SIDE, Tile, Weigh};
 use geometry::direction::spherical;
 
-/// Finds tile and pixel of each point. Remembers nothing; run it as a map before a
+/// Finds tile and pixel of each point. It keeps no state; run it as a map before a
 /// [`super::TileSink`].
 pub struct Scatter {
     lattices: Vec<Option<Lattice>>,
 }
 
-/// Points of one strip, grouped by tile.
+/// The points of one strip, grouped by tile.
 pub struct Scattered {
     pub(super) scan: ScanId,
     pub(super) runs: Vec<TileRun>,
@@ -26,12 +26,12 @@ pub(super) struct TileRun {
     pub(super) n: usize,
 }
 
-/// A strip with shorter runs than this, on average, is worth sorting: one look-up a run costs as
-/// much as about sixteen copies.
+/// Mean length of runs below which a strip is sorted by tile: one look-up of a tile costs as much
+/// as copying about sixteen records.
 const SHORT_RUN: usize = 16;
 
 impl Scatter {
-    /// For strips of these scans (all scans of a run, in their order).
+    /// A scatter for strips of these scans (all scans of a run, in their order).
     #[must_use]
     pub fn new(scans: &[Scan]) -> Self {
         Self { lattices: scans.iter().map(|s| s.lattice).collect() }
@@ -71,11 +71,11 @@ impl Weigh for Scattered {
     }
 }
 
-/// Points whose pixels are found together: small enough for the first-level cache, long enough for
-/// vector loops.
+/// Number of points whose pixels are computed together: few enough for the first-level cache,
+/// enough for vector loops.
 const BLOCK: usize = 64;
 
-/// Pixels of a block of points: the same as [`Lattice::pixel`] gives one by one.
+/// Pixels of a block of points, equal to those that [`Lattice::pixel`] returns for each point.
 #[inline]
 fn lattice_pixels(lattice: &Lattice, points: &[[f32; 3]], pixels: &mut [Pixel; BLOCK]) {
     if lattice.lattice_from_scan != nalgebra::UnitQuaternion::identity() || points.len() < BLOCK {
@@ -84,7 +84,7 @@ fn lattice_pixels(lattice: &Lattice, points: &[[f32; 3]], pixels: &mut [Pixel; B
         }
         return;
     }
-    // One loop a step, so that each becomes vector instructions.
+    // Each step has its own loop, so that the compiler makes vector instructions of it.
     let (mut azimuth, mut elevation) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
     for (i, p) in points.iter().enumerate().take(BLOCK) {
         (azimuth[i], elevation[i], _) = spherical(*p);
@@ -99,10 +99,12 @@ fn lattice_pixels(lattice: &Lattice, points: &[[f32; 3]], pixels: &mut [Pixel; B
     }
 }
 
-/// The ground cells of points of a scan without lattice: row from y, column from x.
+/// Ground cells of the points of a scan without lattice: the row is computed from y, the column
+/// from x.
 fn ground_pixels(points: &[[f32; 3]], pixels: &mut [Pixel; BLOCK]) {
     let offset = Tile::GROUND_OFFSET * i64::from(TILE_SIDE);
-    // Saturating, so that no coordinate panics; ingest has dropped what is not a place on a site.
+    // The conversion saturates, so that no coordinate panics; `ingest` has dropped coordinates
+    // beyond any site.
     let cell =
         |v: f32| ((v / Tile::GROUND_CELL).floor() as i64).saturating_add(offset).max(0) as u32;
     for (p, pixel) in points.iter().zip(pixels) {
@@ -143,7 +145,7 @@ fn records(
     (runs, records)
 }
 
-/// Joins runs of the same tile, keeping their order within it.
+/// Merges runs of the same tile and keeps the order of their records.
 fn grouped(runs: &[TileRun], records: &[Record]) -> (Vec<TileRun>, Vec<Record>) {
     let mut order: Vec<([u32; 2], usize, usize)> = Vec::with_capacity(runs.len());
     let mut start = 0;

@@ -1,7 +1,7 @@
-//! Grouped strips in, a store out. Tiles gather in memory; what does not fit is written: tiles that
-//! no point has come to for the longest time first, since a scanner that has passed a place does
-//! not come back. Where points do come back, the rest of their tile goes through a spill file, and
-//! the tile is written once more in the end.
+//! Gathers the scattered points of strips into tiles and writes the store. Where memory is full,
+//! the tiles that have received no point for the longest time are written first, since a scanner
+//! rarely returns to a place that it has passed. Points that do return go through a spill file, and
+//! their tile is written again at the end.
 
 use super::buffer::{Buffer, TILE_POINTS};
 use super::catalogue::{self, CATALOGUE, TILES, TileEntry};
@@ -19,50 +19,54 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most room that a tile gets before it needs it, points: that of a scan with a point a pixel and a
-/// few more.
+/// Most room that is reserved for a tile in advance, points: that of a scan with one point per
+/// pixel and a few more.
 const USUAL_POINTS: usize = (1 << 16) + (1 << 13);
-/// Tiles of which the memory may be free and wait for the next ones, at most, however large the
-/// budget.
+/// Most tiles whose memory is kept for later tiles, whatever the budget.
 const MAX_FREE: usize = 128;
-/// Records that go to disk at once, bytes: some tens of tiles, and little beside what gathers.
+/// Size of a batch of records that is written at once, bytes: some tens of tiles, little beside
+/// what waits in memory.
 const BATCH_BYTES: usize = 48 << 20;
 
-/// Fills a store. Feed it in the order of the input.
+/// Fills a store. Strips must be added in the order of the input.
 pub struct TileSink {
     dir: PathBuf,
     encode: Arc<Encode>,
-    /// Where the tile of a scan, row and column has its buffer; never iterated.
+    /// Index of the buffer of each scan, row and column; never iterated.
     places: HashMap<(u32, [u32; 2]), usize>,
     buffers: Vec<Buffer>,
-    /// Room of all buffers, bytes.
+    /// Reserved room of all buffers, bytes.
     bytes: usize,
-    /// Most points that a tile had when it was written: room for the next ones, so that they need
-    /// not grow.
+    /// Most points that a written tile had: the room that is reserved for later ones.
     usual: usize,
     budget_bytes: usize,
     writer: Writer,
     spill: Option<Spill>,
     n_points: u64,
     n_strips: u64,
-    /// First scan of the store.
+    /// Number of the first scan of the store.
     first: u32,
 }
 
 impl TileSink {
     /// Begins a store in `dir` for strips of `scans` (all of a run, in their order) from the scan
-    /// `first` on; it keeps about `budget_bytes` in memory while it is filled. An older store in
-    /// `dir` is removed.
+    /// `first` on. It keeps about `budget_bytes` bytes in memory while it is filled. An older store
+    /// in `dir` is removed.
     ///
     /// # Errors
-    /// A folder or file that cannot be made.
+    /// A folder or file that cannot be created.
     pub fn create(dir: &Path, scans: &[Scan], first: u32, budget_bytes: usize) -> Result<Self> {
         std::fs::create_dir_all(dir)
-            .map_err(|e| Error::of_file("the store cannot be made", dir, e))?;
-        // Without its catalogue an old store is no store: nobody can take old tiles for new ones.
+            .map_err(|e| Error::of_file("the folder of the store cannot be created", dir, e))?;
+        // Removing the catalogue first makes the old store invalid: its tiles can never be taken
+        // for new ones.
         match std::fs::remove_file(dir.join(CATALOGUE)) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                return Err(Error::of_file("an old catalogue cannot be removed", dir, e));
+                return Err(Error::of_file(
+                    "the catalogue of an earlier store cannot be removed",
+                    dir,
+                    e,
+                ));
             }
             _ => {}
         }
@@ -84,7 +88,7 @@ impl TileSink {
         })
     }
 
-    /// Number of points taken so far.
+    /// Number of points added so far.
     #[must_use]
     pub fn n_points(&self) -> u64 {
         self.n_points
@@ -96,7 +100,7 @@ impl TileSink {
         self.spill.as_ref().map_or(0, Spill::len)
     }
 
-    /// Takes the points of one strip.
+    /// Adds the points of one strip.
     pub fn add(&mut self, strip: &Scattered) -> Result<()> {
         let mut start = 0;
         self.n_strips += 1;
@@ -124,8 +128,8 @@ impl TileSink {
         })
     }
 
-    /// Brings tiles to disk until they fit into the budget again, those first that were touched the
-    /// longest time ago.
+    /// Writes tiles to disk until the rest fits into the budget, in the order of their last point,
+    /// oldest first.
     fn relieve(&mut self) -> Result<()> {
         let mut order: Vec<usize> =
             (0..self.buffers.len()).filter(|&i| !self.buffers[i].records.is_empty()).collect();
@@ -140,7 +144,7 @@ impl TileSink {
             let records = std::mem::take(&mut buffer.records);
             self.bytes -= records.capacity() * Record::BYTES;
             self.usual = self.usual.max(records.len().min(USUAL_POINTS));
-            // Points have come back to it, or are too many for one tile: the end decides.
+            // Points have returned to this tile, or it has too many: its parts are made at the end.
             let early = !buffer.comes_back()
                 && records.len() <= TILE_POINTS
                 && span(&records) <= LONGEST_SPAN;
@@ -158,8 +162,8 @@ impl TileSink {
         self.writer.write(batch)
     }
 
-    /// Writes what is left of the tiles, and the catalogue, and opens the store. `open_bytes` as in
-    /// [`Store::open`].
+    /// Writes the remaining tiles and the catalogue, and opens the store. `open_bytes` is the
+    /// `resident_bytes` of [`Store::open`].
     pub fn finish(self, engine: &Engine, open_bytes: usize) -> Result<Store> {
         let Self { dir, encode, mut buffers, writer, spill, first, .. } = self;
         let (mut file, written) = writer.finish()?;
@@ -186,7 +190,8 @@ impl TileSink {
     }
 }
 
-/// Tiles of which the memory may be free: a quarter of the budget, where each takes what most do.
+/// Number of tiles whose memory is kept for later ones: a quarter of the budget, for tiles of usual
+/// size.
 fn n_free(budget_bytes: usize) -> usize {
     (budget_bytes / 4 / (USUAL_POINTS * Record::BYTES)).min(MAX_FREE)
 }

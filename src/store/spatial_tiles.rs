@@ -1,5 +1,5 @@
-//! Where points lie in, how many spatial tiles they fill out; more than a run may write are refused
-//! before any is written.
+//! Counts the spatial tiles of the result that the points of a store fill, and refuses a run that
+//! would write too many of them before anything is written.
 
 use super::{Store, TileEntry};
 use crate::engine::{Engine, Task};
@@ -7,15 +7,15 @@ use contract::{Error, Kind, Result, Scan};
 use geometry::{Aabb, Point};
 use std::collections::BTreeSet;
 
-/// Spatial tiles that the bounds of a tile of the store may touch and still be taken for filled,
-/// all of them: a long shot of a scanner.
+/// Number of spatial tiles up to which the bounds of one store tile count as filled without a look
+/// at its points.
 const FEW: u64 = 64;
 
-/// A spatial tile: its row and column.
+/// Row and column of a spatial tile.
 type At = [i32; 2];
 
-/// About how many spatial tiles points fill that mostly lie within these bounds, and how many there
-/// may be.
+/// Estimated number of spatial tiles for points that mostly lie within these bounds, and the most
+/// that may be written.
 pub(crate) fn expected(spread: &Aabb, n_points: u64, settings: &export::Settings) -> [u64; 2] {
     let most = (settings.max_tiles as u64).min(n_points);
     if !settings.tiles {
@@ -24,10 +24,10 @@ pub(crate) fn expected(spread: &Aabb, n_points: u64, settings: &export::Settings
     [if spread.is_empty() { most.min(1) } else { n_touched(spread, settings).min(n_points) }, most]
 }
 
-/// Refuses more spatial tiles than there may be.
+/// Refuses a number of spatial tiles above the limit.
 ///
 /// # Errors
-/// The first of the two numbers is greater than the second.
+/// `OverBudget` where the number `n` is greater than the limit `most`.
 pub(crate) fn within([n, most]: [u64; 2]) -> Result<()> {
     if n <= most {
         return Ok(());
@@ -40,10 +40,11 @@ pub(crate) fn within([n, most]: [u64; 2]) -> Result<()> {
     ))
 }
 
-/// A store whose points fill no more spatial tiles than there may be.
+/// Returns the store after a check that its points do not fill more spatial tiles than may be
+/// written.
 ///
 /// # Errors
-/// They are more than there may be; tiles of the store that cannot be read.
+/// Too many spatial tiles, or tiles of the store that cannot be read.
 pub(crate) fn checked(
     store: Store,
     scans: &[Scan],
@@ -56,7 +57,7 @@ pub(crate) fn checked(
     Ok(store)
 }
 
-/// Counts the spatial tiles that the points of a store fill.
+/// Counts the spatial tiles that the points of a store fill, and checks the number.
 fn check(
     store: &Store,
     scans: &[Scan],
@@ -64,7 +65,8 @@ fn check(
     engine: &Engine,
 ) -> Result<()> {
     let most = settings.max_tiles as u64;
-    // Bounds tell enough of nearly every plant: points are only read where they do not.
+    // Bounds are sufficient for nearly every plant: points are read only for tiles with wide
+    // bounds.
     let (few, many): (Vec<usize>, Vec<usize>) = (0..store.entries().len())
         .partition(|&i| n_touched(&store.entries()[i].bounds, settings) <= FEW);
     let mut filled: BTreeSet<At> = BTreeSet::new();
@@ -88,7 +90,7 @@ fn check(
     within([all.len() as u64, most])
 }
 
-/// Spatial tiles that hold points of a tile of the store.
+/// The spatial tiles that hold points of one tile of the store.
 fn filled_by(
     store: &Store,
     i: usize,
@@ -104,7 +106,7 @@ fn filled_by(
     Ok(tile.xyz.iter().map(at).collect())
 }
 
-/// Least and greatest row and column of spatial tiles that a box touches.
+/// Least and greatest row and column of the spatial tiles that a box touches.
 fn corners(bounds: &Aabb, settings: &export::Settings) -> [[i64; 2]; 2] {
     let place = |at: &[f64; 3]| [1, 0].map(|axis| (at[axis] / settings.tile_edge).floor() as i64);
     [place(&bounds.min), place(&bounds.max)]
@@ -139,7 +141,7 @@ mod tests {
         let error = within(expected(&wide, 1 << 30, &settings)).expect_err("too many");
         assert_eq!(error.kind(), Kind::OverBudget);
         assert!(error.to_string().contains("--units"), "{error}");
-        // Bounds that no plant has.
+        // Bounds beyond those of any plant.
         let absurd = Aabb { min: [-1e300; 3], max: [1e300; 3] };
         assert!(n_touched(&absurd, &settings) > 1 << 60);
     }

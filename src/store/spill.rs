@@ -1,5 +1,5 @@
-//! Records in, segments of a spill file out, and back. The file has no name in the folder once it
-//! is open (where the system can do that), so that nothing is left behind when the program is
+//! The spill file of a sink: records are appended as segments and read back. Where the system
+//! allows it, the open file has no name in its folder, so that nothing remains when the program is
 //! killed.
 
 use super::record::Record;
@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Consecutive records in the spill file.
+/// Offset and number of consecutive records in the spill file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segment {
     offset: u64,
@@ -30,7 +30,7 @@ impl Spill {
         Ok(Self { dir: dir.to_owned(), file, len: 0 })
     }
 
-    /// Bytes written.
+    /// Number of bytes written.
     pub(super) fn len(&self) -> u64 {
         self.len
     }
@@ -45,7 +45,7 @@ impl Spill {
         Ok(segment)
     }
 
-    /// Appends a segment to `records`. No more writing after the first reading.
+    /// Reads a segment and appends it to `records`. After the first read no more may be written.
     pub(super) fn read(&mut self, segment: &Segment, records: &mut Vec<Record>) -> Result<()> {
         let start = records.len();
         records.resize(start + segment.n, Record::zeroed());

@@ -1,4 +1,5 @@
-//! The store from outside: whatever way points come in, the same tiles come out; damage is named.
+//! Tests of the store through its public calls: strips, memory and threads do not change the tiles,
+//! and damage is reported by name.
 
 use super::catalogue::TILES;
 use super::record::N_LEVELS;
@@ -40,7 +41,7 @@ pub(super) fn scans() -> Vec<Scan> {
     vec![scan(0, Some(Lattice::new(0.004, 0.003, 0.0, 0.0))), scan(1, Some(turned)), scan(2, None)]
 }
 
-/// A room, scanned in rows or shuffled; every seventh place is a gap.
+/// A strip of a scanned room, in rows or shuffled; every seventh place is a gap.
 fn strip(scan: u32, from: usize, to: usize) -> Strip {
     let xyz = (from..to)
         .map(|i| {
@@ -87,7 +88,7 @@ pub(super) fn build(
     (sink.finish(&engine, 1 << 16).expect("finishes"), spilled)
 }
 
-/// All tiles; where they lie in the file is nobody's business.
+/// All tiles of a store, independent of their order in the file.
 pub(super) fn tiles(store: &Store) -> Vec<Tile> {
     store.picks(|_| 0).map(|pick| pick.and_then(|p| store.read(&p)).expect("whole")).collect()
 }
@@ -241,7 +242,7 @@ fn damage_is_named() {
     assert_eq!(error.kind(), Kind::BadInput);
     let place = format!("{}: scan 0, tile", tiles.display());
     assert!(error.to_string().starts_with(&place), "{error}");
-    // Who reads no more than the part that is whole does not mind.
+    // Reading only the undamaged levels succeeds.
     let coarse = (N_LEVELS - finest) as u32;
     assert!(finest > 0 && store.tile(0, coarse).is_ok() && store.tile(1, 0).is_ok());
     drop(store);
@@ -259,7 +260,7 @@ fn a_store_that_is_cut_short_under_a_run_is_named_and_the_program_lives() {
     let path = dir.path().join(TILES);
     let n = store.entries().len();
     let cut = |len| std::fs::OpenOptions::new().write(true).open(&path)?.set_len(len);
-    // A tile whose checksums are known already, and one that was never read.
+    // One tile whose checksums were compared before, and others that were never read.
     store.tile(0, 0).expect("is whole");
     cut(64).expect("cuts");
     let named = |error: contract::Error| {
@@ -270,7 +271,7 @@ fn a_store_that_is_cut_short_under_a_run_is_named_and_the_program_lives() {
             "{text}"
         );
     };
-    // Pages that the system still has are whole; those behind the new end are not.
+    // Cached pages of the file remain valid; those beyond the new end are gone.
     let errors: Vec<_> = (0..n).filter_map(|i| store.tile(i, 0).err()).collect();
     assert_eq!(errors.len(), n, "every tile lies in pages that are gone");
     errors.into_iter().for_each(named);

@@ -1,6 +1,5 @@
-//! Batches of tiles in, written behind the back of the sink that gathers the next ones; their
-//! entries out in the end. Threads in turn encode tiles while another one waits for the disk to
-//! take those before.
+//! Writes batches of tiles in the background while the sink gathers the next ones. Threads encode
+//! tiles in turn, and another thread appends them to the file in order.
 
 use super::catalogue::TileEntry;
 use super::encode::{Encode, Encoded};
@@ -11,30 +10,30 @@ use crossbeam::channel::{Receiver, Sender, bounded, unbounded};
 use std::sync::Arc;
 use std::thread::{Builder, JoinHandle, ScopedJoinHandle};
 
-/// Tiles with the numbers of their buffers.
+/// Tiles with the indices of their buffers.
 type Batch = Vec<(usize, TilePart)>;
-/// The file, and the entries of what is in it.
+/// The tile file, and the entries of the tiles in it.
 type Written = (TileFile, Vec<(usize, TileEntry)>);
 
-/// Threads that encode: two do it faster than a disk takes what they make.
+/// Number of encoding threads: two encode faster than a disk writes.
 const ENCODERS: usize = 2;
-/// Tiles that wait for each of them, and encoded ones of each that wait for the disk, at most: a
+/// Most tiles that wait for each encoder, and most encoded tiles of each that wait for the disk: a
 /// megabyte or two each.
 const WAITING: usize = 2;
 
 /// Threads that encode tiles and append them to a file.
 pub(super) struct Writer {
     batches: Option<Sender<Batch>>,
-    /// Memory of records that are written, no more than is of use: fresh memory costs as much as
-    /// what is done with it.
+    /// Memory of written records, kept for later tiles: fresh memory costs as much time as
+    /// encoding.
     free: Receiver<Vec<Record>>,
     thread: Option<JoinHandle<Result<Written>>>,
 }
 
 impl Writer {
-    /// Starts them; the memory of so many tiles is kept to be used again.
+    /// Starts the threads; the memory of `n_free` tiles is kept for later ones.
     pub(super) fn start(file: TileFile, encode: &Arc<Encode>, n_free: usize) -> Result<Self> {
-        // One batch waits while another is written: memory is bounded by both.
+        // One batch waits while another is written, so that both bound the memory.
         let (batches, taken) = bounded(1);
         let encode = Arc::clone(encode);
         let (give, free) = bounded(n_free);
@@ -45,26 +44,26 @@ impl Writer {
         Ok(Self { batches: Some(batches), free, thread: Some(thread) })
     }
 
-    /// Memory that was used before; none where there is none.
+    /// Memory of a written tile; an empty vector where there is none.
     pub(super) fn room(&self) -> Vec<Record> {
         self.free.try_recv().unwrap_or_default()
     }
 
-    /// Hands a batch over; waits where the disk is slower than the points come.
+    /// Passes a batch to the threads, and waits where the disk is slower than the points come.
     pub(super) fn write(&mut self, batch: Batch) -> Result<()> {
         let taken = self.batches.as_ref().is_some_and(|batches| batches.send(batch).is_ok());
-        // A writer that has gone has failed, and says why.
+        // A writer whose channel is closed has failed; its result holds the error.
         if taken { Ok(()) } else { self.end().map(drop) }
     }
 
-    /// Waits for all that was handed over.
+    /// Waits until all batches are written.
     pub(super) fn finish(mut self) -> Result<Written> {
         self.end()
     }
 
     fn end(&mut self) -> Result<Written> {
         drop(self.batches.take());
-        let lost = || Error::new(Kind::Bug, "the writer of tiles was lost");
+        let lost = || Error::new(Kind::Bug, "the thread that writes tiles ended without a result");
         match self.thread.take().map(JoinHandle::join) {
             Some(Ok(written)) => written,
             Some(Err(_)) | None => Err(lost()),
@@ -93,22 +92,22 @@ fn work(
         }
         let append = move || append(file, &takes, &give_back);
         let append = start("store disk").spawn_scoped(scope, append).map_err(failed)?;
-        // In turn, so that they come out in turn as well. Who appends has failed where nobody takes
-        // any more, and says why.
+        // Tiles are passed to the encoders in turn and taken back in turn, which keeps their order.
+        // If the appending thread has failed, its result holds the error.
         for (turn, part) in batches.iter().flatten().enumerate() {
             if gives[turn % ENCODERS].send(part).is_err() {
                 break;
             }
         }
         drop(gives);
-        let lost = || Error::new(Kind::Bug, "a thread of the writer of tiles was lost");
+        let lost = || Error::new(Kind::Bug, "a thread that encodes tiles ended without a result");
         let is_lost = encoders.into_iter().map(ScopedJoinHandle::join).any(|end| end.is_err());
         let written = append.join().map_err(|_| lost())?;
         if is_lost { Err(lost()) } else { written }
     })
 }
 
-/// Encodes tiles, in memory that was used before where there is some.
+/// Encodes tiles, in memory of earlier tiles where there is some.
 fn encode_all(
     encode: &Encode,
     parts: &Receiver<(usize, TilePart)>,
@@ -121,7 +120,7 @@ fn encode_all(
         let room = rooms.try_recv().unwrap_or_default();
         let encoded = encode.encode(&mut part, &mut order, room);
         part.records.clear();
-        // The sink has enough, or is at its end, where nobody takes it.
+        // Nobody takes the memory where the sink has enough or has ended.
         let _ = free.try_send(part.records);
         if done.send((i, encoded)).is_err() {
             return;
@@ -129,7 +128,7 @@ fn encode_all(
     }
 }
 
-/// Appends encoded tiles, of each encoder in turn; gives their memory back.
+/// Appends encoded tiles, one of each encoder in turn, and returns their memory.
 fn append(
     mut file: TileFile,
     encoders: &[Receiver<(usize, Encoded)>],
@@ -138,7 +137,7 @@ fn append(
     let mut written = Vec::new();
     for (i, encoded) in encoders.iter().cycle().map_while(|tiles| tiles.recv().ok()) {
         written.push((i, file.append(&encoded)?));
-        // Nobody encodes any more where nobody wants it.
+        // Nobody takes the memory where the encoders have ended.
         let _ = give_back.send(encoded.bytes);
     }
     Ok((file, written))

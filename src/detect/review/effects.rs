@@ -1,6 +1,5 @@
-//! A review, the robots that would be reported without it and those that are reported with it in;
-//! what each of its entries did, in a sentence, out: a person's word is never passed over in
-//! silence.
+//! Effects of a review: each of its entries gets a sentence that states what it changed, from a
+//! comparison of the robots with and without the review. No entry is passed over in silence.
 
 use super::{Decision, Review, ReviewPlace};
 use crate::detect::robot_id::robot_id;
@@ -9,20 +8,20 @@ use contract::{Fit, Verdict};
 use export::ReviewEntry;
 use geometry::Point;
 
-/// Bases nearer than this are of one robot, metres.
+/// Distance of bases below which two fits are of the same robot, metres.
 const SAME_BASE: f64 = 0.35;
 
-/// What is compared to tell what an entry did.
+/// The robots with and without the review, which are compared to find the effect of each entry.
 struct WithAndWithout<'a> {
     /// Robots that would be reported without the review.
     without: &'a [Fit],
-    /// Robots that are reported, in their order.
+    /// Robots that are reported, in the order of the result.
     with: &'a [Fit],
-    /// Entries, by number, whose posture the scans do not bear out.
+    /// Indices of the entries whose posture the scans contradict.
     wrong: &'a [usize],
 }
 
-/// What an entry did, and whether a person should look at it again.
+/// The effect of an entry, and whether a person should look at it again.
 struct Effect {
     what: String,
     is_odd: bool,
@@ -39,15 +38,20 @@ impl Effect {
 }
 
 impl Review {
-    /// What each entry did, in their order: robots that would be reported without the review, those
-    /// that are, and entries whose posture the scans do not bear out.
+    /// The effect of each entry, in order, from the robots that would be reported without the
+    /// review, the robots that are reported, and the entries whose posture the scans contradict.
     #[must_use]
-    pub(crate) fn did(&self, without: &[Fit], with: &[Fit], wrong: &[usize]) -> Vec<ReviewEntry> {
-        self.told(&WithAndWithout { without, with, wrong })
+    pub(crate) fn effects(
+        &self,
+        without: &[Fit],
+        with: &[Fit],
+        wrong: &[usize],
+    ) -> Vec<ReviewEntry> {
+        self.effects_of(&WithAndWithout { without, with, wrong })
     }
 
-    /// What each entry did, in their order.
-    fn told(&self, robots: &WithAndWithout<'_>) -> Vec<ReviewEntry> {
+    /// The effect of each entry, in order.
+    fn effects_of(&self, robots: &WithAndWithout<'_>) -> Vec<ReviewEntry> {
         let entry = |(k, place): (usize, &ReviewPlace)| {
             let Effect { what, is_odd } = match place.verdict {
                 Some(Decision::Reject) => self.rejected(place, robots),
@@ -57,9 +61,9 @@ impl Review {
             let start = if place.joints.is_empty() {
                 ""
             } else if robots.wrong.contains(&k) {
-                "; the posture that it gives is not what the scans show, and was not used"
+                "; its posture contradicts the scans and was not used"
             } else {
-                "; the fit began at the posture that it gives"
+                "; the fit started at its posture"
             };
             let (word, at) = (place.word(), place.words());
             let did = format!("{word} near {at}: {what}{start}");
@@ -72,20 +76,18 @@ impl Review {
     fn rejected(&self, place: &ReviewPlace, robots: &WithAndWithout<'_>) -> Effect {
         let gone: Vec<&Fit> = robots.without.iter().filter(|f| place.has(f)).collect();
         if gone.is_empty() {
-            return Effect::odd("nothing was found there, so it changed nothing");
+            return Effect::odd("no robot was found there, so the entry has no effect");
         }
         let names: Vec<String> = gone.iter().map(|f| described(f)).collect();
-        let mut what = format!(
-            "{} is not reported; points there count as standing still",
-            names.join(" and ")
-        );
+        let mut what =
+            format!("{} is not reported; its points are labelled as fixed", names.join(" and "));
         let is_trusted = gone.iter().any(|f| f.verdict == Verdict::Trusted);
         if is_trusted {
-            what += "; the program trusted it: look whether this is meant";
+            what += "; without the review it would be trusted: check whether this is intended";
         }
         if let Some(other) = self.other(place, Decision::Accept, robots) {
             what +=
-                &format!("; entry {other} accepts a robot there, and a rejection goes before that");
+                &format!("; entry {other} accepts a robot there, but a rejection takes precedence");
             return Effect::odd(what);
         }
         Effect { what, is_odd: is_trusted }
@@ -95,7 +97,7 @@ impl Review {
         let Some((at, fit)) = place.reported(robots.with) else {
             return match self.other(place, Decision::Reject, robots) {
                 Some(other) => Effect::odd(format!(
-                    "entry {other} rejects what stands there, and goes before: no robot is reported"
+                    "entry {other} rejects a robot there and takes precedence: no robot is reported"
                 )),
                 None => Effect::odd(place.missing()),
             };
@@ -105,21 +107,21 @@ impl Review {
             let instead = robots.without.iter().filter(|f| place.has(f)).map(described);
             let instead: Vec<String> = instead.collect();
             return Effect::as_asked(if instead.is_empty() {
-                format!("{name} is trusted; without it no robot would be reported there")
+                format!("{name} is trusted; without the entry no robot would be reported there")
             } else {
                 format!("{name} is trusted, instead of {}", instead.join(" and "))
             });
         };
         Effect::as_asked(if before.verdict == Verdict::Trusted {
-            format!("{name} was trusted without it, so it changed nothing")
+            format!("{name} is trusted without the entry, which therefore has no effect")
         } else {
             let why = before.reasons.join("; ");
-            format!("{name} is trusted, which was {}: {why}", before.verdict.word())
+            format!("{name} is trusted; without the entry it was {}: {why}", before.verdict.word())
         })
     }
 
-    /// Number of an entry of the other mind about a place: one that holds the same robot, or whose
-    /// middle it holds.
+    /// Number of an entry with the opposite verdict about the same place: one whose place contains
+    /// the same robot, or the middle of this place.
     fn other(
         &self,
         place: &ReviewPlace,
@@ -137,7 +139,7 @@ impl Review {
 }
 
 impl ReviewPlace {
-    /// What the entry asks for, in words.
+    /// The request of the entry as a word.
     fn word(&self) -> String {
         let model = self.model.as_deref();
         match self.verdict {
@@ -147,7 +149,7 @@ impl ReviewPlace {
         }
     }
 
-    /// What an entry without a verdict did.
+    /// The effect of an entry without a verdict.
     fn expected(&self, robots: &WithAndWithout<'_>) -> Effect {
         let Some((at, fit)) = self.reported(robots.with) else {
             return Effect::odd(self.missing());
@@ -167,13 +169,13 @@ impl ReviewPlace {
         })
     }
 
-    /// What is said where no robot stands that should.
+    /// The sentence for a place without the expected robot.
     fn missing(&self) -> String {
         let what = self.model.as_deref().unwrap_or("robot");
-        format!("none of the robots that were found stands there, so no {what} is reported")
+        format!("no robot was found there, so no {what} is reported")
     }
 
-    /// The robot here that explains most, and its place among those that are reported.
+    /// The reported robot here that explains most points, with its index.
     fn reported<'f>(&self, with: &'f [Fit]) -> Option<(usize, &'f Fit)> {
         self.best(with).map(|at| (at, &with[at]))
     }
@@ -187,13 +189,13 @@ impl ReviewPlace {
             .find(|f| (at(f) - at(fit)).norm() < SAME_BASE)
     }
 
-    /// Whether its middle lies within another place.
+    /// Whether the middle of this place lies within another place.
     fn is_within(&self, other: &Self) -> bool {
         (Point::from(self.at) - Point::from(other.at)).norm() <= other.radius
     }
 }
 
-/// A robot in words: model, verdict, score.
+/// Model, verdict and score of a robot as text.
 fn described(fit: &Fit) -> String {
     format!("{} ({}, score {})", fit.model_name, fit.verdict.word(), fixed(fit.score, 2))
 }
@@ -207,7 +209,7 @@ mod tests {
         let review = Review { places };
         let with = review.apply(without.to_vec());
         let robots = WithAndWithout { without, with: &with, wrong: &[] };
-        review.told(&robots).into_iter().map(|e| (e.did, e.needs_look)).collect()
+        review.effects_of(&robots).into_iter().map(|e| (e.did, e.needs_look)).collect()
     }
 
     fn trusted(model: &str, x: f64) -> Fit {
@@ -226,11 +228,11 @@ mod tests {
                 true,
             ),
             (
-                "reject near (5.10, 0.00, 0.00): b (doubtful, score 0.50) is not reported; points there count as standing still",
+                "reject near (5.10, 0.00, 0.00): b (doubtful, score 0.50) is not reported; its points are labelled as fixed",
                 false,
             ),
             (
-                "reject near (0.10, 0.00, 0.00): a (trusted, score 0.93) is not reported; points there count as standing still; \
+                "reject near (0.10, 0.00, 0.00): a (trusted, score 0.93) is not reported; its points are labelled as fixed; \
                  the program trusted it: look whether this is meant",
                 true,
             ),
@@ -246,7 +248,7 @@ mod tests {
             let said = told(places, &[trusted("a", 0.1)]);
             let [accepted, rejected] =
                 if n == 2 { [&said[0], &said[1]] } else { [&said[1], &said[0]] };
-            let goes_before = format!("entry {n} rejects what stands there, and goes before");
+            let goes_before = format!("entry {n} rejects a robot there and takes precedence");
             assert!(accepted.1 && accepted.0.contains(&goes_before), "{}", accepted.0);
             let other = format!("entry {} accepts a robot there", 3 - n);
             assert!(rejected.1 && rejected.0.contains(&other), "{}", rejected.0);
@@ -264,9 +266,9 @@ mod tests {
         let said = told(places, &[trusted("a", 0.0), doubtful]);
         let words: Vec<&str> =
             said.iter().map(|(did, _)| did.split(": ").nth(1).unwrap_or("")).collect();
-        assert_eq!(words[0], "R1 a was trusted without it, so it changed nothing");
+        assert_eq!(words[0], "R1 a is trusted without the entry, which therefore has no effect");
         assert!(
-            said[1].0.ends_with("R2 b is trusted, which was doubtful: few points"),
+            said[1].0.ends_with("R2 b is trusted; without the entry it was doubtful: few points"),
             "{}",
             said[1].0
         );

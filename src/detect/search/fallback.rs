@@ -1,5 +1,5 @@
-//! A region and the fits of what stands plainly in it in; the fits of what is harder to find out:
-//! on walls and ceilings, behind other things, on stands that nobody sees, moved between scans.
+//! Fallback passes of the search of a region, for robots that the plain search does not find: on
+//! walls and ceilings, behind other objects, on hidden stands, and robots that moved between scans.
 
 use super::tried::TriedBases;
 use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
@@ -11,41 +11,42 @@ use geometry::{Aabb, Point};
 use robot::Model;
 use std::collections::BTreeMap;
 
-/// Score of a base on a wall or a ceiling from which on it is looked at: a plant has many walls,
-/// and few carry robots.
+/// Least score of a base on a wall or a ceiling that is fitted: a plant has many walls, and few
+/// carry robots.
 const MIN_MOUNT_SCORE: f64 = 0.15;
-/// The same of a base on a stand of which nothing is seen.
+/// Least score of a base on a stand of which nothing is seen.
 const MIN_STAND_SCORE: f64 = 0.10;
-/// Such stands are looked for where at least so many points are left over, so far above the
-/// region's lowest, metres: a stand with an arm that may reach down from it; benches and most
-/// conveyors are no higher.
+/// Least number of unexplained points for a search of hidden stands.
 const MIN_LEFT: usize = 500;
+/// Least height of these points above the lowest point of the region, metres: a stand with an arm
+/// that reaches down from it is higher. Benches and most conveyors are lower.
 const MIN_STANDING: f64 = 0.9;
-/// How far beyond the box of a link points may be its own, metres.
+/// Distance from the box of a link up to which points may belong to the link, metres.
 const BOX_MARGIN: f64 = 0.08;
-/// Places on walls, ceilings and such stands that are looked at for each model.
+/// Most places on walls, ceilings and hidden stands that are fitted for each model.
 const MAX_MOUNTS: usize = 2;
-/// So many times the base poses are looked at where a region is searched for what is left over; and
-/// so many places for each model.
+/// Factor on the number of base poses and places of each model when unexplained points of a region
+/// are searched.
 const BREADTH: usize = 3;
 const MAX_LEFT_OVER: usize = 4;
-/// So many times the base poses are looked at before walls and the like, where a place is there at
-/// five heights at most.
+/// Factor on the number of base poses in front of walls and plates, where a place occurs at five
+/// heights at most.
 const RAISED_BREADTH: usize = 2;
-/// What hangs on a wall keeps its base so far above the floor, metres.
+/// Least height above the floor of a base on a wall, metres.
 const FLOOR_SLACK: f64 = 0.05;
-/// Score of a base from which on it is asked whether its robot moved between scans, and so many of
-/// a region are.
+/// Least score of a base that is examined for a robot that moved between scans.
 const MIN_FOOT: f64 = 0.12;
+/// Most bases of a region that are examined for such a robot.
 const MAX_FEET: usize = 8;
-/// Share of what was here and gone that must be within its reach: two robots may have moved.
+/// Least share of the vanished voxels that must lie within the reach of one robot: two robots may
+/// have moved.
 const GONE_IN_REACH: f64 = 0.3;
-/// Cells of what was here for one scan and gone for another from which on a robot may have moved: a
+/// Least number of cells that one scan saw occupied and another empty, for a robot that moved: a
 /// small arm has 100.
 const MIN_GONE: usize = 80;
 
 impl Search<'_, '_> {
-    /// Fits of robots on ceilings, walls and tilted plates.
+    /// Fits of robots that are mounted on ceilings, walls and tilted plates.
     pub(super) fn on_mounts(
         &self,
         scene: &MeasuredScene<'_>,
@@ -56,7 +57,7 @@ impl Search<'_, '_> {
         self.hung(scene, sight, "mounts", is_wanted, tried)
     }
 
-    /// Fits of robots that hang beside trusted ones, where much is left that those do not explain.
+    /// Fits of mounted robots beside trusted ones, where those leave many points unexplained.
     pub(super) fn hung_beside(
         &self,
         scene: &MeasuredScene<'_>,
@@ -65,16 +66,16 @@ impl Search<'_, '_> {
         tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
-            // They were asked for in all of the region.
+            // The whole region was searched for mounted robots before.
             return Ok(Vec::new());
         }
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
         self.hung(scene, sight, "mounts beside", &|c: &Candidate| is_apart(c, &feet), tried)
     }
 
-    /// Fits on the region's ceilings, walls and tilted plates, of what is wanted of these
-    /// candidates; kept under a name. Where none of them is trusted, before these planes, too:
-    /// what stands there may be bolted to a plate.
+    /// Fits on the region's ceilings, walls and tilted plates, of those candidates that `wanted`
+    /// accepts; cached under `name`. If none is trusted, planes in front of these are tried as
+    /// well, since a robot may be bolted to a plate.
     fn hung(
         &self,
         scene: &MeasuredScene<'_>,
@@ -100,22 +101,22 @@ impl Search<'_, '_> {
         Ok(fits)
     }
 
-    /// Ceilings, walls and tilted plates about the region.
+    /// Ceilings, walls and tilted plates near the region.
     fn mounts(&self, region: &Region) -> Vec<InstallationPlane> {
         let world = region.world_bounds().grown(0.3);
         let sides = self.ground.surfaces.sides.iter();
         floor::mounts(&sides.filter(|p| p.bounds.touches(&world)).collect::<Vec<_>>())
     }
 
-    /// Whether no base of a candidate reaches into the floor.
+    /// Whether all bases of a candidate lie above the floor.
     fn is_above_floor(&self, candidate: &Candidate) -> bool {
         let at = candidate.bases[0].0.translation.vector;
         let height = self.ground.surfaces.floor.height_above(at.into(), MAX_SUNK);
         height.is_none_or(|h| h > FLOOR_SLACK)
     }
 
-    /// Fits of robots that less is seen of than of what stands about those that were found: without
-    /// that, more bases of each model are looked at.
+    /// Fits of robots that are seen less than the objects around the robots that were found; for
+    /// these, more bases of each model are examined.
     pub(super) fn left_over(
         &self,
         scene: &MeasuredScene<'_>,
@@ -131,8 +132,8 @@ impl Search<'_, '_> {
         self.fits(scene, &few(found, MAX_LEFT_OVER), tried)
     }
 
-    /// Fits of robots that hide all of the stand under their feet: where much is left that no
-    /// trusted robot explains, all heights are tried.
+    /// Fits of robots whose feet hide their stands: where trusted robots leave many points
+    /// unexplained, all heights are tried.
     pub(super) fn on_stands(
         &self,
         scene: &MeasuredScene<'_>,
@@ -153,15 +154,15 @@ impl Search<'_, '_> {
         self.fits(scene, &few(found, MAX_MOUNTS), tried)
     }
 
-    /// Lets only points count that are on no trusted robot; returns the bases of those robots where
-    /// much is left, `None` where little is.
+    /// Restricts the scene to points that are on no trusted robot. Returns the bases of those
+    /// robots, or `None` where few points are left.
     fn pass_over(
         &self,
         scene: &MeasuredScene<'_>,
         sight: &mut RegionEvidence<'_>,
         fits: &[Fit],
     ) -> Option<Vec<Point>> {
-        // Without beams nothing contradicts a wrong base.
+        // Without beams there is no free space that could contradict a wrong base.
         if !scene.evidence.has_beams() {
             return None;
         }
@@ -172,8 +173,9 @@ impl Search<'_, '_> {
         is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
     }
 
-    /// Robots that moved between scans: where no robot is trusted, but something stands like a
-    /// robot's foot within whose reach things were here and gone (region's frame).
+    /// Fits of robots that moved between scans: where no robot is trusted, but a base like a
+    /// robot's foot is found within whose reach space was occupied for one scan and empty for
+    /// another (region frame).
     pub(super) fn moved(
         &self,
         fits: &[Fit],
@@ -207,13 +209,13 @@ impl Search<'_, '_> {
     }
 }
 
-/// Whether a candidate stands at none of these bases.
+/// Whether a candidate lies apart from all of these bases.
 fn is_apart(candidate: &Candidate, feet: &[Point]) -> bool {
     let here = base(&candidate.bases[0].0);
     !feet.iter().any(|at| (at - here).norm() < SAME_BASE)
 }
 
-/// The best candidates of each model, few.
+/// The best candidates of each model, at most `most`.
 fn few(mut candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
     let mut n: BTreeMap<usize, usize> = BTreeMap::new();
     candidates.retain(|c| {
@@ -224,7 +226,7 @@ fn few(mut candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
     candidates
 }
 
-/// Boxes of the links of a robot, world, metres.
+/// Bounding boxes of the links of a fitted robot, world frame, metres.
 fn boxes(fit: &Fit, model: &Model) -> Vec<Aabb> {
     let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
     let poses = model.poses(&posture);

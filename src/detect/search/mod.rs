@@ -1,5 +1,5 @@
-//! A region in, the fits of all models in it out: reads the tiles that the region's views need, and
-//! sends every model of the library through base search and fit.
+//! The search of a region: reads the tiles that the region's views need, and sends every model of
+//! the library through base search and fit.
 
 mod fallback;
 mod tried;
@@ -24,7 +24,7 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use tried::TriedBases;
 
-/// A library with what fits of its models need, made when the first of them asks for it.
+/// A library and, for each model, data that fits of it need, prepared at first use.
 pub(crate) struct PreparedLibrary<'a> {
     models: &'a [Model],
     prepared: Vec<OnceLock<Prepared<'a>>>,
@@ -35,59 +35,61 @@ impl<'a> PreparedLibrary<'a> {
         Self { models, prepared: models.iter().map(|_| OnceLock::new()).collect() }
     }
 
-    /// The library.
+    /// The models of the library.
     pub(crate) fn models(&self) -> &'a [Model] {
         self.models
     }
 
-    /// Makes what these models need now.
+    /// Prepares these models now, in parallel.
     pub(crate) fn prepare(&self, names: &BTreeSet<&str>, fan: &dyn Fan) {
         for (i, own) in self.prepared.iter().enumerate() {
             if own.get().is_none() && names.contains(self.models[i].name.as_str()) {
                 let prepared = Prepared::new(i, &self.models[i], fan);
                 prepared.make_triangles(fan);
-                // Where another thread was first, that one stays.
+                // If another thread was faster, its value is kept.
                 own.set(prepared).ok();
             }
         }
     }
 
-    /// Serial inside: a thread that waits for it never holds up its own work.
+    /// The prepared model. Preparing it here is serial, so that a thread that waits for it never
+    /// delays its own work.
     pub(crate) fn prepared(&self, index: usize) -> &Prepared<'a> {
         self.prepared[index].get_or_init(|| Prepared::new(index, &self.models[index], &OneByOne))
     }
 }
 
-/// Everything that the search of a region reads.
+/// Scans, store, ground, library and settings that the search of a region reads.
 pub(crate) struct Search<'a, 'm> {
     library: &'a PreparedLibrary<'m>,
     scans: &'a [Scan],
     store: &'a Store,
     ground: &'a Ground,
     settings: &'a Settings,
-    /// Regions of the plant, where whole robots of it are looked at again.
+    /// Regions of the plant, in which a robot at the border of one region is looked up whole.
     regions: &'a [Region],
-    /// Where what was found of a region piece by piece is kept, for a run that is cut short.
+    /// Cache of the fits of single candidates, with which an interrupted run continues.
     kept: Option<&'a Cache>,
-    /// Told of models that are searched for and candidates that are fitted.
+    /// Progress of models that are searched and candidates that are fitted.
     pieces: Pieces,
 }
 
-/// A base farther below a floor belongs to a lower level, metres.
+/// Depth below the floor beyond which a base belongs to a lower level, metres.
 const MAX_SUNK: f64 = 2.0;
-/// Candidates that are fitted at the same time; then it is asked which others they make needless.
+/// Number of candidates that are fitted at once, before candidates that their fits make needless
+/// are dropped.
 const BATCH: usize = 6;
-/// What is looked at of a robot to find its base reaches no farther from it, metres: foot and
-/// shoulder.
+/// Distance from a base within which points are used to find it, metres: foot and shoulder.
 const FOOT: f64 = 1.5;
-/// Bases nearer than this are at one place, metres.
+/// Distance below which bases are at the same place, metres.
 const SAME_BASE: f64 = 0.35;
-/// How far beside what is seen of a robot its base may be, metres.
+/// Distance from the seen points of a robot at which its base may lie, metres.
 const FOOT_BESIDE: f64 = 0.3;
-/// Share of the score of a trusted robot's base below which another base at its place is needless.
+/// Share of the score of a trusted robot's base below which another base at its place is not
+/// fitted.
 const FAR_WORSE: f64 = 0.7;
-/// So many times the base poses are looked at where heights are guessed: each place is there at
-/// many.
+/// Factor on the number of base poses where heights are guessed, since each place then occurs at
+/// many heights.
 const GUESS_BREADTH: usize = 8;
 
 impl<'a, 'm> Search<'a, 'm> {
@@ -102,24 +104,24 @@ impl<'a, 'm> Search<'a, 'm> {
         Self { library, scans, store, ground, settings, regions, kept, pieces }
     }
 
-    /// The same, which knows the regions of the plant.
+    /// Sets the regions of the plant.
     #[must_use]
     pub(crate) fn over(self, regions: &'a [Region]) -> Self {
         Self { regions, ..self }
     }
 
-    /// The same, which keeps what it finds of a region piece by piece.
+    /// Sets the cache for fits of single candidates.
     #[must_use]
     pub(crate) fn keeping(self, kept: &'a Cache) -> Self {
         Self { kept: Some(kept), ..self }
     }
 
-    /// What is told of models that are searched for and candidates that are fitted.
+    /// Progress of models that are searched and candidates that are fitted.
     pub(crate) fn pieces(&self) -> &Pieces {
         &self.pieces
     }
 
-    /// A piece of what is found in a region: the one that is kept, else a new one.
+    /// The cached piece of this name for a region; otherwise `find` computes it.
     fn piece<T: Serialize + DeserializeOwned>(
         &self,
         region: &Region,
@@ -129,7 +131,7 @@ impl<'a, 'm> Search<'a, 'm> {
         self.get_or_compute(&format!("{region:?} {name}"), || Ok(find()))
     }
 
-    /// The piece of that name that is kept, else a new one.
+    /// The cached piece of this name; otherwise `find` computes it.
     pub(crate) fn get_or_compute<T: Serialize + DeserializeOwned>(
         &self,
         name: &str,
@@ -141,22 +143,23 @@ impl<'a, 'm> Search<'a, 'm> {
         }
     }
 
-    /// The library.
+    /// The library with its prepared models.
     pub(crate) fn library(&self) -> &'a PreparedLibrary<'m> {
         self.library
     }
 
-    /// Bounds of all points, world, metres.
+    /// Bounds of all points, world frame, metres.
     pub(crate) fn bounds(&self) -> Aabb {
         self.store.entries().iter().fold(Aabb::EMPTY, |all, entry| all.union(&entry.bounds))
     }
 
-    /// Fits of all models in one region, whatever their verdict.
+    /// Fits of all models in one region, with every verdict.
     pub(crate) fn region(&self, region: &Region) -> Result<Vec<Fit>> {
         self.region_about(region, None)
     }
 
-    /// The same for those whose bases are so near a place (world, metres), where one is given.
+    /// Like [`Search::region`]; where `about` is given (world frame, metres), only for bases within
+    /// that radius of the place.
     pub(crate) fn region_about(
         &self,
         region: &Region,
@@ -178,12 +181,12 @@ impl<'a, 'm> Search<'a, 'm> {
         candidates.retain(is_wanted);
         let mut tried = TriedBases::default();
         let mut fits = self.fits(&scene, &candidates, &mut tried)?;
-        // What stands on the floor explains most regions; ceilings and walls are asked where
-        // nothing does.
+        // Robots on the floor explain most regions; ceilings and walls are searched where there is
+        // none.
         if fits.iter().all(|f| f.verdict != Verdict::Trusted) {
             fits.extend(self.on_mounts(&scene, &sight, &is_wanted, &mut tried)?);
         }
-        // At one place all that could be left over was looked at already.
+        // A search at one place has examined all points there already.
         if about.is_none() {
             fits.extend(self.left_over(&scene, &mut sight, &planes, &fits, &mut tried)?);
             fits.extend(self.hung_beside(&scene, &mut sight, &fits, &mut tried)?);
@@ -195,7 +198,7 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(fits)
     }
 
-    /// Fits of all robots of the library by the baseline.
+    /// Fits all robots of the library by the baseline method.
     fn by_baseline(&self, scene: &MeasuredScene<'_>, planes: &[InstallationPlane]) -> Vec<Fit> {
         let (judging, settings) = (&self.settings.fit, &self.settings.paper);
         let fit =
@@ -205,8 +208,8 @@ impl<'a, 'm> Search<'a, 'm> {
         robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
-    /// Where robots of all models may stand on some planes, best base first, those that score so
-    /// much; so many times the usual base poses are looked at.
+    /// Candidates of all models on some planes with at least this score, best base first. `breadth`
+    /// is a factor on the number of base poses.
     fn candidates(
         &self,
         sight: &RegionEvidence<'_>,
@@ -233,8 +236,9 @@ impl<'a, 'm> Search<'a, 'm> {
         out
     }
 
-    /// Fits of candidates, which come best base first: where a robot is trusted, bases that fit the
-    /// place far worse are not tried any more, nor are those that were tried before.
+    /// Fits of candidates, which are sorted by the score of their base. Where a robot is trusted,
+    /// bases that score far less at its place are not fitted, nor are bases that were fitted
+    /// before.
     fn fits(
         &self,
         scene: &MeasuredScene<'_>,
@@ -275,8 +279,7 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(out)
     }
 
-    /// The fit of a robot that stands in a region as an earlier one had it; `None` where it does
-    /// not.
+    /// Fits a robot of an earlier fit again; `None` where it is not in the region.
     pub(crate) fn again(
         &self,
         region: &Region,
@@ -293,7 +296,7 @@ impl<'a, 'm> Search<'a, 'm> {
         })
     }
 
-    /// The fit of a model on a base that is known, in the scene of the region about it.
+    /// Fits a model on a known base, in the scene of the region around it.
     pub(crate) fn on_base(
         &self,
         scene: &MeasuredScene<'_>,
@@ -310,7 +313,7 @@ impl<'a, 'm> Search<'a, 'm> {
         fit::fit(&candidate, prepared, scene, &self.settings.fit, &AllThreads)
     }
 
-    /// Does something with the scene of a region.
+    /// Calls `work` with the scene of a region.
     pub(crate) fn in_scene<T>(
         &self,
         region: &Region,
@@ -322,15 +325,14 @@ impl<'a, 'm> Search<'a, 'm> {
         Ok(work(&scene, &self.settings.fit))
     }
 
-    /// Does something with the scene that a fit stands in; `None` where it stands in none of the
-    /// regions.
+    /// Calls `work` with the scene that contains a fit; `None` where no region contains it.
     pub(crate) fn with_scene<T>(
         &self,
         fit: &Fit,
         work: impl FnOnce(&MeasuredScene<'_>, &fit::Settings) -> T,
     ) -> Result<Option<T>> {
         let at = base(&fit.world_from_base);
-        // Large regions overlap: an arm at the border of one is whole in the other.
+        // Large regions overlap: an arm at the border of one region is whole in the other.
         let within = |r: &Region| {
             let Aabb { min, max } = r.world_bounds();
             (0..2).map(|i| (at[i] - min[i]).min(max[i] - at[i])).fold(f64::INFINITY, f64::min)
@@ -341,7 +343,7 @@ impl<'a, 'm> Search<'a, 'm> {
         home.map(|region| self.in_scene(region, work)).transpose()
     }
 
-    /// Where the refinement of a model alone ends from each of the starts.
+    /// End points of the refinement of a model from each of the starts.
     pub(crate) fn converge(
         &self,
         region: &Region,
@@ -355,13 +357,13 @@ impl<'a, 'm> Search<'a, 'm> {
         })
     }
 
-    /// Planes that a robot of this region may stand on; heights guessed all over the region where
-    /// the plant has no floor to go by (a camera's view, a cut-out).
+    /// Planes that may carry a robot of this region. Where the plant has no floor (a camera's view,
+    /// a cut-out), heights all over the region are guessed.
     fn planes(&self, region: &Region) -> Vec<InstallationPlane> {
         let world = region.world_bounds();
         let floor = &self.ground.surfaces.floor;
-        // Without beams nothing contradicts a wrong height, and every one of them would have to be
-        // tried out.
+        // Without beams there is no free space that could contradict a wrong height, and every
+        // height would have to be fitted.
         let has_beams = self.scans.iter().any(Scan::has_beams);
         if floor.levels.is_empty() && has_beams {
             return base_search::guessed_planes(&world);
@@ -370,7 +372,7 @@ impl<'a, 'm> Search<'a, 'm> {
     }
 }
 
-/// The part of a region in which bases are looked for that stand so near a place.
+/// The part of a region that contains bases within `radius` of a place.
 fn feet(region: &Region, place: &Point, radius: f64) -> Region {
     let (at, reach) = (place - region.origin, radius + FOOT);
     let mut bounds = region.bounds;
@@ -381,7 +383,7 @@ fn feet(region: &Region, place: &Point, radius: f64) -> Region {
     Region { bounds, ..*region }
 }
 
-/// So many times the base poses are looked at on planes of a region.
+/// Factor on the number of base poses for the planes of a region.
 fn breadth(planes: &[InstallationPlane]) -> usize {
     if planes.iter().all(InstallationPlane::is_guess) { GUESS_BREADTH } else { 1 }
 }

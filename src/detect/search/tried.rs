@@ -1,15 +1,14 @@
-//! Candidates of a region that were fitted in, whether another one is nothing new out: what is left
-//! over is searched for bases again, and where it finds those of before, their fits would be the
-//! same.
+//! Candidates of a region that were fitted before. A fallback pass may find bases of an earlier
+//! pass again, whose fits would be the same.
 
 use contract::Candidate;
 use geometry::Pose;
 
-/// Bases nearer than this to each other are one for a fit, metres and radians: it moves them
-/// farther itself.
+/// Distance (metres) and angle (radians) below which two bases count as the same for a fit, which
+/// moves its base by more than that.
 const SAME: (f64, f64) = (0.01, 0.01);
 
-/// Models and the bases that they were fitted on.
+/// Indices of models, and the bases that they were fitted on.
 #[derive(Default)]
 pub(super) struct TriedBases(Vec<(usize, Vec<Pose>)>);
 
@@ -18,7 +17,7 @@ impl TriedBases {
         self.0.push((candidate.model, candidate.bases.iter().map(|base| base.0).collect()));
     }
 
-    /// Whether its model was fitted on all of its bases.
+    /// Whether the candidate's model was fitted on all of the candidate's bases.
     pub(super) fn knows(&self, candidate: &Candidate) -> bool {
         let is_among = |known: &[Pose]| {
             candidate.bases.iter().all(|base| known.iter().any(|known| is_same(known, &base.0)))

@@ -1,5 +1,5 @@
-//! A region in, what each scan saw of it out: reads the tiles that the region's views need, no more
-//! points of them than a fit can use.
+//! Builds the views of a region: for each scan, depth image and points of the region, from those
+//! tiles and levels that a fit needs.
 
 use super::Search;
 use crate::engine::AllThreads;
@@ -7,14 +7,15 @@ use contract::{Region, Result, Scan, View};
 use lattice::{ViewBuilder, ViewSettings};
 use rayon::prelude::*;
 
-/// Points of a region beyond which more of them tell a fit nothing new: a robot has a hundredth of
-/// that in its adjustment. Up to four times as many are kept.
+/// Number of points of a region beyond which more do not improve a fit: the adjustment of a robot
+/// uses a hundredth of it. Up to four times as many are kept.
 const ENOUGH_POINTS: u64 = 3_000_000;
-/// Beams farther apart than this at a region, metres, say nothing of use about a robot's posture.
+/// Distance of neighbouring beams at a region beyond which a scan tells too little about a posture,
+/// metres.
 const MAX_SPACING: f64 = 0.05;
 
 impl Search<'_, '_> {
-    /// What each scan sees of the region, those that see something.
+    /// Views of all scans that see part of the region.
     pub(super) fn views(&self, region: &Region) -> Result<Vec<View>> {
         let thin = self.thin(region);
         let mut views = self.seen(region, Some(thin), &self.settings.view)?;
@@ -22,7 +23,8 @@ impl Search<'_, '_> {
         Ok(views)
     }
 
-    /// The same as the beams say it, none of them doubted, as fine as asked for; without points.
+    /// Depth images of all scans that see part of the region, at the resolution of `settings`,
+    /// without points and without doubted beams.
     pub(crate) fn images(&self, region: &Region, settings: &ViewSettings) -> Result<Vec<View>> {
         self.seen(region, None, settings)
     }
@@ -37,14 +39,15 @@ impl Search<'_, '_> {
         scans.filter_map(|scan| self.view(scan, region, thin, settings).transpose()).collect()
     }
 
-    /// How much of the points of a region may be skipped: as much as leaves [`ENOUGH_POINTS`].
+    /// The `skip` of tiles that leaves about [`ENOUGH_POINTS`] points of a region (see
+    /// [`Tile::skip`]).
     fn thin(&self, region: &Region) -> u32 {
         let touching = self.store.touching(&region.world_bounds());
         let n_points: u64 = touching.iter().map(|&i| self.store.entries()[i].n_points).sum();
         (0..).find(|thin| n_points >> (2 * (thin + 1)) < ENOUGH_POINTS).unwrap_or(0)
     }
 
-    /// One scan's view of the region; `None` where it sees nothing of it.
+    /// The view of one scan; `None` where it sees nothing of the region.
     fn view(
         &self,
         scan: &Scan,
@@ -72,7 +75,7 @@ impl Search<'_, '_> {
     }
 }
 
-/// Distance from a scan's scanner to the nearest point of a region, metres.
+/// Distance from the scanner to the nearest point of a region, metres.
 fn distance(scan: &Scan, region: &Region) -> f64 {
     let scanner = scan.world_from_scan.translation.vector - region.origin.coords;
     (0..3)

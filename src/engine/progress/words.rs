@@ -1,28 +1,31 @@
-//! How far a stage is, in; words for people, or JSON for programs, out.
+//! Text of a progress line for people, and the JSON object of the same state for programs.
 
 use crate::engine::amount::Amount;
 use contract::words::count;
 
-/// Seconds to go at the rate so far.
+/// Estimated seconds that remain, at the average rate so far; `None` where no total is known.
 fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
     let share = done.share(total).filter(|s| *s > 0.0)?;
     Some(seconds * (1.0 - share) / share)
 }
 
-/// How far a stage is.
+/// Progress of a stage at one moment.
 pub(super) struct StageState<'a> {
-    /// What is done, and what there is in all.
+    /// The amount that is done.
     pub(super) done: &'a Amount,
+    /// The total amount of the stage.
     pub(super) total: &'a Amount,
-    /// Pieces that are done, and pieces that are known so far.
+    /// Numbers of pieces done and of pieces known so far.
     pub(super) pieces: [u64; 2],
-    /// Since it began; and processor time of the whole program since then.
+    /// Wall-clock seconds since the stage began.
     pub(super) seconds: f64,
+    /// Processor seconds that the whole program has used since the stage began.
     pub(super) cpu_seconds: f64,
-    /// Whether it has ended.
+    /// Whether the stage has ended.
     pub(super) is_over: bool,
 }
 
+/// The progress as a line for people.
 pub(super) fn words(state: &StageState<'_>) -> String {
     let &StageState { done, total, pieces: [n_done, n_known], seconds, is_over: last, .. } = state;
     let mut words = Vec::new();
@@ -39,7 +42,7 @@ pub(super) fn words(state: &StageState<'_>) -> String {
     if n_known > 0 && !last {
         words.push(format!("{n_done} of {} known so far", count(n_known, "piece")));
     }
-    // Where no total is known, bytes are those of items in memory, which say nothing to people.
+    // Without a known total, bytes count items in memory and mean nothing to people.
     if total.bytes > 0 {
         words.push(format!("{}B/s", short(rate(done.bytes))));
     }
@@ -51,6 +54,7 @@ pub(super) fn words(state: &StageState<'_>) -> String {
     words.join(", ")
 }
 
+/// The progress as a JSON object for programs.
 pub(super) fn json(name: &str, state: &StageState<'_>) -> String {
     let &StageState { done, total, pieces: [n_done, n_known], seconds, cpu_seconds, is_over } =
         state;

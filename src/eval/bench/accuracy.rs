@@ -1,5 +1,5 @@
-//! `bench accuracy`: suites of drawn cells in; how well postures, standard deviations and verdicts
-//! hold, as tables, out.
+//! `bench accuracy`: measures postures, standard deviations and verdicts on suites of random cells,
+//! as tables.
 //!
 //! Each case is drawn from a seed, scanned in memory by the virtual scanner and sent through the
 //! same stages as the main job, from strips of points on: nothing but the scans' points and stated
@@ -21,22 +21,22 @@ use robot::Model;
 use std::path::Path;
 use std::time::Instant;
 
-/// What is asked for.
+/// Request of the bench.
 #[derive(Debug, Clone)]
 pub struct AccuracyBench {
-    /// Seed, library and folders; nothing is kept but rows and tables.
+    /// Seed, library and folders; only rows and tables are kept.
     pub drawn: DrawnCases,
     /// Names of suites; all where empty.
     pub suites: Vec<String>,
-    /// Cases of each suite; its own number where left out.
+    /// Number of cases of each suite; `None` for the suite's own number.
     pub n_cases: Option<usize>,
-    /// Only models whose name holds one of these; all where empty.
+    /// Only models whose name contains one of these; all where empty.
     pub models: Vec<String>,
-    /// Whether each cell is searched for all models of the library, or for the right one only.
+    /// Whether each cell is searched for all models of the library, or only for the true one.
     pub whole_library: bool,
 }
 
-/// Runs the suites; returns the table.
+/// Runs the suites and returns the table.
 pub fn accuracy(bench: &AccuracyBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
     let robots = bench.drawn.library(temporary.path())?;
@@ -49,7 +49,7 @@ pub fn accuracy(bench: &AccuracyBench, means: &Means, engine: &Engine) -> Result
     let library = PreparedLibrary::new(&models);
     let mut rows = Vec::with_capacity(cases.len());
     let store = tempfile::tempdir()?;
-    // What stages say of single cells would drown what is said of cases.
+    // Messages of stages about single cells would hide those about cases.
     let mut quiet = Engine::new(engine.n_workers);
     quiet.cancel = engine.cancel.clone();
     for (i, case) in cases.iter().enumerate() {
@@ -73,18 +73,17 @@ pub fn accuracy(bench: &AccuracyBench, means: &Means, engine: &Engine) -> Result
     Ok(table)
 }
 
-/// All rows, with the version that they were measured with.
+/// All rows, with the program version.
 fn json(rows: &[AccuracyRow]) -> Result<String> {
     let whole = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "rows": rows });
     serde_json::to_string_pretty(&whole)
         .map_err(|e| Error::new(Kind::Bug, "rows cannot be written").because(e))
 }
 
-/// Standard deviations of shift and turn of scans that are taken to be where they are said to be: a
-/// nanometre, a nanoradian.
+/// Standard deviations of shift and turn for scans with exact poses: a nanometre, a nanoradian.
 const HELD: f64 = 1e-9;
 
-/// One case; what goes wrong in it is a row, too.
+/// Runs one case; an error becomes a row.
 fn run(
     case: &DrawnCase,
     library: &PreparedLibrary<'_>,
@@ -135,7 +134,7 @@ fn run(
     }
 }
 
-/// Models that a case is searched for, where they are not all of the library.
+/// Models that a case is searched for, unless they are all of the library.
 fn few(case: &DrawnCase, models: &[Model], whole_library: bool) -> Option<Vec<Model>> {
     if whole_library && case.condition.perturbed_deg == 0.0 {
         return None;

@@ -1,5 +1,5 @@
-//! A robot of a scene in; what hangs on its arm out: hoses from body to body, a gripper with a
-//! part, a dress pack, a rag.
+//! Items on the arm of a random robot: hoses between links, a gripper with a part, a dress pack, a
+//! rag.
 
 use geometry::Vector;
 use nalgebra::{Rotation3, UnitQuaternion};
@@ -8,18 +8,18 @@ use simulate::random::Random;
 use simulate::scene::{Anchor, CarriedBox, Hose, ToolShape};
 use simulate::{Scene, part_in, tool_on};
 
-/// Hoses along an arm, at most (METHOD.md §19, T8 and T9).
+/// Most hoses along an arm (METHOD.md §19, T8 and T9).
 const N_HOSES: usize = 3;
-/// Half their thickness, metres.
+/// Radius of hoses, metres.
 const RADIUS: [f64; 2] = [0.015, 0.025];
-/// How far from the surface clamps hold them, metres.
+/// Distance of clamped hoses from the surface, metres.
 const CLAMP: f64 = 0.03;
-/// How far a dress pack and a rag are from the surface, metres.
+/// Distance of a dress pack and of a rag from the surface, metres.
 const SHELL: f64 = 0.02;
 const LAID: f64 = 0.005;
 
-/// Hoses along the arm, from the second body on, each from the top of one to the top of the next;
-/// with this chance.
+/// Hoses along the arm from the second link on, each from the top of one link to the top of the
+/// next, with this probability.
 pub(super) fn hoses(scene: &mut Scene, model: &Model, chance: f64, random: &mut Random) {
     let links = bodies(model);
     if random.unit() >= chance || links.len() <= 3 {
@@ -43,8 +43,8 @@ pub(super) fn hoses(scene: &mut Scene, model: &Model, chance: f64, random: &mut 
     }
 }
 
-/// A gripper with a part, a dress pack along the forearm and a rag on the upper arm, each with this
-/// chance; all as large as befits a robot of this reach, metres.
+/// A gripper with a part, a dress pack on the forearm and a rag on the upper arm, each with this
+/// probability and scaled to the robot's reach, metres.
 pub(super) fn load(scene: &mut Scene, model: &Model, chance: f64, reach: f64, random: &mut Random) {
     let mut there = || random.unit() < chance;
     let [has_part, has_pack, has_rag] = [there(), there(), there()];
@@ -66,7 +66,7 @@ pub(super) fn load(scene: &mut Scene, model: &Model, chance: f64, reach: f64, ra
     }
 }
 
-/// A box of a size on top of a link, along its longest side, so far from its surface, metres.
+/// A box on top of a link, along its longest side, at a distance from its surface, metres.
 fn laid(model: &Model, link: usize, name: &str, gap: f64, size: [f64; 3]) -> CarriedBox {
     let (at, away) = top(model, link);
     let extent = model.links[link].bounds.size();
@@ -88,8 +88,8 @@ fn laid(model: &Model, link: usize, name: &str, gap: f64, size: [f64; 3]) -> Car
     }
 }
 
-/// The point of a link's surface nearest to the middle of its upper side, and the way off it,
-/// link's frame, metres.
+/// The point of a link's surface nearest to the middle of its upper side, and the outward direction
+/// there, link frame, metres.
 fn top(model: &Model, link: usize) -> (Vector, Vector) {
     let own = &model.links[link];
     let wide = |p: &[f32; 3]| Vector::from(p.map(f64::from));

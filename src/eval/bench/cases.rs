@@ -1,5 +1,5 @@
-//! Cases in, each done in a folder of its own; their rows, kept as they come, and one table of them
-//! out.
+//! Runs the cases of a bench, each in its own folder, and writes their rows as they come and one
+//! table.
 
 use super::journal::Journal;
 use super::request::DrawnCases;
@@ -9,25 +9,25 @@ use export::atomic;
 use serde::Serialize;
 use std::path::Path;
 
-/// What a case came to.
+/// Outcome of a case.
 pub(super) trait CaseRow: Serialize {
-    /// It could not be done to its end.
+    /// The case failed.
     fn fail(&mut self, why: String);
 
-    /// One line for people.
+    /// The outcome as one line for people.
     fn line(&self) -> String;
 }
 
-/// A row to fill in, and what it is filled from.
+/// A case to run: an empty row and its inputs.
 pub(super) struct CaseToRun<R, T> {
-    /// Name of its folder, where it is kept.
+    /// Name of its folder, if it is kept.
     pub(super) name: String,
     pub(super) row: R,
     pub(super) of: T,
 }
 
 impl<R> CaseToRun<R, usize> {
-    /// The first `n` cases that are asked for, a seed each; each is made from its number.
+    /// The first `n` requested cases, each made from its own seed.
     pub(super) fn numbered(drawn: &DrawnCases, n: usize, row: impl Fn(u64) -> R) -> Vec<Self> {
         let case = |k: usize| {
             let seed = drawn.seed_of(k);
@@ -37,18 +37,18 @@ impl<R> CaseToRun<R, usize> {
     }
 }
 
-/// Where cases are done, and what becomes of them.
+/// Folders of the cases, and whether they are kept.
 pub(super) struct Cases<'a> {
-    /// Names the files of rows and table.
+    /// Base name of the files of rows and table.
     pub(super) name: &'a str,
-    /// Where rows and table go, and whether the folders of the cases are kept there.
+    /// Folder of rows and table, and whether the folders of cases are kept there.
     pub(super) drawn: &'a DrawnCases,
-    /// Where they are else.
+    /// Temporary folder of the cases otherwise.
     pub(super) temporary: &'a Path,
 }
 
 impl Cases<'_> {
-    /// Does all of them, one after the other: a case that fails is a row that says so.
+    /// Runs all cases one after the other; a failed case becomes a row.
     pub(super) fn run<R: CaseRow, T>(
         &self,
         cases: Vec<CaseToRun<R, T>>,

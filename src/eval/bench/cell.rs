@@ -1,4 +1,4 @@
-//! A scene in; its scans in memory, and what the main job's own stages find in them, out.
+//! Scans a random cell in memory and sends the scans through the stages of the main job.
 
 use crate::detect::calibrate::calibrate;
 use crate::detect::ground::Ground;
@@ -19,58 +19,58 @@ use simulate::{Scene, SimColumns, Simulator};
 use std::path::Path;
 use std::time::Instant;
 
-/// A cell as its scanners saw it.
+/// A scanned cell with its truth.
 #[derive(Default)]
 pub(super) struct ScannedCell {
     scans: Vec<Scan>,
     strips: Vec<Strip>,
-    /// What each point of each scan truly lies on.
+    /// The true surface of each point of each scan.
     truth: Vec<Vec<Real>>,
-    /// For each thing of the scene, whether it is a hose.
+    /// For each object of the scene, whether it is a hose.
     hoses: Vec<bool>,
-    /// Points that truly lie on the robot.
+    /// Number of points that truly lie on the robot.
     n_robot_points: usize,
 }
 
-/// What a point truly lies on.
+/// The true surface of a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Real {
     pub(super) label: Label,
     pub(super) on_hose: bool,
 }
 
-/// What was found, and how long it took.
+/// Results of the search, and its time.
 #[derive(Default)]
 pub(super) struct FoundInCell {
     pub(super) fits: Vec<Fit>,
     pub(super) n_robot_points: usize,
     /// Seconds from the regions and the store to fits.
     pub(super) seconds: f64,
-    /// Where the refinement alone ended from each start.
+    /// End points of the refinement from each start.
     pub(super) ends: Vec<Start>,
-    /// What the points near robots are said to be, and for each scan what they are.
+    /// Labels of points near robots, and true surfaces for each scan.
     pub(super) labels: Option<(NearRobots, Vec<Vec<Real>>)>,
 }
 
-/// World from base, and a posture.
+/// Base pose in the world frame, and a posture.
 pub(super) type Start = (Pose, Vec<f64>);
 
-/// What is done beside the search.
+/// Additional computations besides the search.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Then<'a> {
     /// Nothing.
     Nothing,
-    /// No search: the first model's refinement alone, from each of these.
+    /// Only the refinement of the first model, from each of these starts.
     Converge(&'a [Start]),
-    /// What was found is adjusted once more, from the truth where that is given.
+    /// A further adjustment of the results, from the truth where it is given.
     Adjust(Option<&'a Start>),
 }
 
-/// Columns cast at a time.
+/// Number of columns that are cast at a time.
 const COLUMNS: u32 = 32;
 
 impl ScannedCell {
-    /// Scans a scene. `models` are the true ones.
+    /// Scans a scene; `models` are the true models.
     pub(super) fn scan(scene: &Scene, models: &[Model], engine: &Engine) -> Result<Self> {
         let simulator = Simulator::new(scene, models)?;
         let is_hose = |thing: &String| thing.starts_with("hose ");
@@ -124,8 +124,8 @@ impl ScannedCell {
         *place += hits.len() as u64;
     }
 
-    /// Sends the scans through the stages of the main job, from the store on; the models of the
-    /// library are tried.
+    /// Sends the scans through the stages of the main job, from the store on, with the models of
+    /// the library.
     pub(super) fn search(
         self,
         library: &PreparedLibrary<'_>,
@@ -183,8 +183,8 @@ fn nearest<'r>(regions: &'r [Region], world_from_base: &Pose) -> Option<&'r Regi
     regions.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
 }
 
-/// Fits adjusted once more from where they ended, or from a start of the first one's robot; those
-/// that hold.
+/// Fits after a further adjustment, from their own ends or from a start of the first robot, as far
+/// as it converges.
 fn adjusted(
     fits: &[Fit],
     from: Option<&Start>,

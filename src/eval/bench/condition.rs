@@ -1,15 +1,16 @@
-//! Names of suites and a seed in; cases, each with everything that its drawing needs, out.
+//! Conditions of the suites: how the cells of each suite are drawn and scanned, and the list of
+//! cases for a seed.
 
 use super::request::{DrawnCases, check_suites};
 use contract::Result;
 use robot::Model;
 
-/// What a robot is bolted to.
+/// Mount of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mounting {
     /// The floor, or a stand on it.
     Floor,
-    /// A block that is narrower than its foot, so that nobody sees what it stands on.
+    /// A block that is narrower than the foot, so that no scanner sees it.
     Pillar,
     /// A plate overhead.
     Ceiling,
@@ -19,23 +20,22 @@ pub(super) enum Mounting {
     Tilted,
 }
 
-/// How the robot of a case is found: as the product does, or as a baseline that it is measured
-/// against.
+/// Method with which a case is solved: that of the product, or a baseline for comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
-    /// As the product does.
+    /// The method of the product.
     Whole,
-    /// Link after link, as the method's source does.
+    /// The link-by-link sweep of the paper.
     Sequential,
-    /// Link after link, then the product's adjustment.
+    /// The link-by-link sweep, followed by the product's adjustment.
     SequentialAdjusted,
-    /// As the product does, but that scans are taken to be where they are said to be.
+    /// The method of the product with scan poses taken as exact.
     ScansHeld,
-    /// The product's adjustment alone, from the truth: no search can do better.
+    /// The product's adjustment alone, from the truth: the best that any search can reach.
     FromTruth,
 }
 
-/// What a cell is like and how it is scanned.
+/// Contents of a cell, and how it is scanned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Condition {
     pub(super) n_scanners: usize,
@@ -54,7 +54,7 @@ pub(super) struct Condition {
     pub(super) each_side: bool,
     /// Whether a part of one link's surface, a cover, is off.
     pub(super) uncovered: bool,
-    /// By how much of its size the surface of one link is larger.
+    /// Enlargement of one link's surface, as a share of its size.
     pub(super) scaled: f64,
     /// How far joints are from where the model has them, one sigma: shift on each axis, metres,
     /// turn about each but their own, degrees.
@@ -65,10 +65,9 @@ pub(super) struct Condition {
     pub(super) other_branch: bool,
     /// Whether the places of joints are estimated, too.
     pub(super) calibrate: bool,
-    /// Share of 0..1 of each kind of clutter being there: fence, conveyor, cabinet and post, hoses
-    /// along the arm.
+    /// Probability of each kind of clutter: fence, conveyor, cabinet and post, hoses along the arm.
     pub(super) clutter: f64,
-    /// Share of 0..1 of each thing that a robot may bear besides: a gripper with a part, a dress
+    /// Probability of each item that a robot may carry besides: a gripper with a part, a dress
     /// pack, a rag.
     pub(super) laden: f64,
     /// Share of the foot's height that plates about it hide, in a cell fenced in on three sides;
@@ -76,16 +75,16 @@ pub(super) struct Condition {
     pub(super) hidden: f64,
     /// Whether the arm of another robot crosses it.
     pub(super) crossed: bool,
-    /// What the robot is bolted to.
+    /// Mount of the robot.
     pub(super) mount: Mounting,
     /// How far the plate of such a place stands out from under the foot, metres; 0: a large one.
     pub(super) rim: f64,
     /// Whether a wall, a ceiling or a large leaning plate is behind that plate.
     pub(super) backed: bool,
-    /// How its posture is found.
+    /// Method with which the case is solved.
     pub(super) way: Way,
-    /// Only the refinement runs, from starts with every joint off by up to so much, degrees; 0:
-    /// the whole search.
+    /// If not 0, only the refinement runs, from starts with errors of all joints up to this,
+    /// degrees.
     pub(super) perturbed_deg: f64,
     /// Height of a stand is drawn up to this, metres; 0: on the floor.
     pub(super) stand: f64,
@@ -144,12 +143,12 @@ pub(super) struct DrawnCase {
 }
 
 impl DrawnCase {
-    /// Whether it is measured beside the product: its figures are not the product's.
+    /// Whether it belongs to a baseline, whose figures are not those of the product.
     pub(super) fn is_baseline(&self) -> bool {
         self.condition.way != Way::Whole
     }
 
-    /// The same for all cases of a model: they are of one robot.
+    /// Number of the robot's errors, equal for all cases of one robot.
     pub(super) fn robot(&self) -> u64 {
         self.seed / CASES_OF_A_ROBOT
     }
@@ -171,12 +170,12 @@ const SUITES: &[AccuracySuite] = &[
     ("noise-5", 3, |_| Condition { n_beams: 5e7, noise: 0.005, ..PLAIN }),
     ("noise-10", 3, |_| Condition { n_beams: 5e7, noise: 0.010, ..PLAIN }),
     ("registration", 6, |_| REGISTERED),
-    // The same cells as in `registration`, by what others do, and by what none can do.
+    // The cells of `registration` again, solved by the baselines.
     ("sequential", 3, |_| Condition { way: Way::Sequential, ..REGISTERED }),
     ("sequential-adjusted", 3, |_| Condition { way: Way::SequentialAdjusted, ..REGISTERED }),
     ("scans-held", 3, |_| Condition { way: Way::ScansHeld, ..REGISTERED }),
     ("from-truth", 3, |_| Condition { way: Way::FromTruth, ..REGISTERED }),
-    // Beams as in `noise-2`: its errors are told as multiples of those.
+    // Beams as in `noise-2`, since its errors are stated as multiples of those.
     ("mixed", 3, |_| Condition { n_beams: 5e7, mixed: true, ..PLAIN }),
     ("few", 9, |k| Condition { n_scanners: 3 - k % 3, ..PLAIN }),
     ("clutter", 6, |_| Condition { clutter: 1.0, laden: 1.0, mixed: true, ..PLAIN }),
@@ -226,7 +225,7 @@ const SUITES: &[AccuracySuite] = &[
     }),
 ];
 
-/// Which suites are asked for, and how many cases of each.
+/// Requested suites, and the number of their cases.
 pub(super) struct Suites<'a> {
     /// All where empty.
     pub(super) names: &'a [String],
@@ -235,7 +234,7 @@ pub(super) struct Suites<'a> {
     pub(super) drawn: &'a DrawnCases,
 }
 
-/// The cases that are asked for, suite by suite, model by model.
+/// The requested cases, suite by suite, model by model.
 pub(super) fn cases(
     asked: &Suites<'_>,
     models: &[Model],

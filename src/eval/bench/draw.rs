@@ -1,4 +1,4 @@
-//! A case in; the scene that its seed draws, with the true base and posture, out.
+//! Draws the scene of a case from its seed, with the true base and posture.
 
 use super::cell::Start;
 use super::condition::{Condition, DrawnCase, Mounting};
@@ -16,29 +16,29 @@ use simulate::scene::{
 use simulate::{Postures, Scene};
 use std::f64::consts::TAU;
 
-/// A case, drawn.
+/// A drawn case.
 pub(super) struct DrawnCell {
     pub(super) scene: Scene,
     pub(super) world_from_base: Pose,
     pub(super) posture: Vec<f64>,
-    /// Loops that stand on the other of their solutions.
+    /// Closed loops that have their other solution.
     pub(super) other_branches: Vec<usize>,
-    /// Base of another robot beside it, world.
+    /// Base of another robot beside it, world frame.
     pub(super) beside: Option<Vector>,
 }
 
-/// Starts of a case of the basin's curve, and how far their bases are off: metres, radians
-/// (METHOD.md §20).
+/// Number of starts of a case of the convergence basin, and the errors of their bases: metres,
+/// radians (METHOD.md §20).
 const N_STARTS: usize = 24;
 const START_BASE: (f64, f64) = (0.02, 0.0175);
-/// Radius of the circle of scanners, metres, at least (METHOD.md §19); larger robots are scanned
-/// from farther away.
+/// Least radius of the circle of scanners, metres (METHOD.md §19); larger robots are scanned from
+/// farther away.
 const CIRCLE: f64 = 5.0;
 /// Height of a scanner, metres.
 const HEIGHT: f64 = 1.6;
 /// Elevations of a full dome of beams, degrees.
 const DOME: [f64; 2] = [-60.0, 90.0];
-/// Side and thickness of a plate, metres: a carrier that is bolted to steelwork.
+/// Side and thickness of a plate that is bolted to steelwork, metres.
 const PLATE: [f64; 2] = [1.6, 0.08];
 /// Thickness of a plate on something larger, metres, and side and thickness of that.
 const ON_PANEL: [f64; 2] = [0.02, 0.12];
@@ -50,7 +50,7 @@ const PILLAR: [f64; 2] = [0.25, 1.2];
 const NARROW: f64 = 0.7;
 
 impl DrawnCell {
-    /// The library as it really is: the true robot's shape may differ from its model.
+    /// The library with the shapes of the real robots, which may differ from their models.
     pub(super) fn models(&self, models: &[Model], case: &DrawnCase) -> Vec<Model> {
         let mut out = models.to_vec();
         out[case.model] = out[case.model].with_other_branches(&self.other_branches);
@@ -90,12 +90,12 @@ impl Mount {
     }
 }
 
-/// Where tools of the suites are bolted to.
+/// Link that carries the tools of the suites.
 fn flange(arm: &Model) -> usize {
     arm.flanges().first().copied().unwrap_or(0)
 }
 
-/// The tool of a case and how it is bolted on, where its condition wants one.
+/// The tool of a case and its mount, where its condition has one.
 pub(super) fn mount(case: &DrawnCase, models: &[Model]) -> Option<Mount> {
     let tools: Vec<usize> = (0..models.len()).filter(|&i| models[i].is_tool()).collect();
     if !case.condition.tool || tools.is_empty() {
@@ -153,7 +153,7 @@ pub(super) fn draw(case: &DrawnCase, model: &Model) -> Result<DrawnCell> {
         ..RobotPlace::default()
     });
     let reach = reach(model, &world_from_base, &posture);
-    around(&mut scene, c.clutter, reach[0], &mut random);
+    add_clutter(&mut scene, c.clutter, reach[0], &mut random);
     carried_items::hoses(&mut scene, model, c.clutter, &mut random);
     carried_items::load(&mut scene, model, c.laden, reach[0], &mut random);
     scanners(&mut scene, c, reach, &mut random);
@@ -165,7 +165,7 @@ pub(super) fn draw(case: &DrawnCase, model: &Model) -> Result<DrawnCell> {
     Ok(DrawnCell { scene, world_from_base, posture, other_branches, beside })
 }
 
-/// A scene of this seed with nothing but a floor, as level as floors are.
+/// An empty scene of this seed with a floor, as level as real floors are.
 fn empty(seed: u64, random: &mut Random) -> Scene {
     Scene {
         seed,
@@ -186,7 +186,7 @@ fn rpy_deg(pose: &Pose) -> [f64; 3] {
     [roll, pitch, yaw].map(f64::to_degrees)
 }
 
-/// A plate that the robot is bolted to, where it does not stand: the pose of its surface, z away
+/// The plate of a robot that is not on the floor: the pose of its surface, with z pointing away
 /// from it.
 fn plate(
     scene: &mut Scene,
@@ -236,8 +236,8 @@ fn plate(
     Some(turned)
 }
 
-/// Starts of the refinement alone, where the case asks for it: the truth, then every joint and the
-/// base off by something.
+/// Starts of the refinement, where the case asks for it: the truth, then postures with errors of
+/// all joints and of the base.
 pub(super) fn starts(case: &DrawnCase, drawn: &DrawnCell) -> Vec<Start> {
     let off = case.condition.perturbed_deg.to_radians();
     if off == 0.0 {
@@ -259,7 +259,7 @@ fn named(model: &Model, posture: &[f64]) -> std::collections::BTreeMap<String, f
     names.zip(posture.iter().copied()).collect()
 }
 
-/// Height of the lowest sample of what stands still, metres.
+/// Height of the lowest sample of the links that do not move, metres.
 fn foot(model: &Model) -> f64 {
     let poses = model.poses(&model.home());
     let standing = model.links.iter().zip(&poses).filter(|(l, _)| !l.cad.points.is_empty());
@@ -280,7 +280,7 @@ fn narrower(model: &Model) -> f64 {
     })
 }
 
-/// Bounds of the robot in the world: farthest from the upright through its base, and highest,
+/// Greatest distance of the robot from the vertical through its base, and its greatest height,
 /// metres.
 fn reach(model: &Model, world_from_base: &Pose, posture: &[f64]) -> [f64; 2] {
     let base = world_from_base.translation.vector;
@@ -294,8 +294,8 @@ fn reach(model: &Model, world_from_base: &Pose, posture: &[f64]) -> [f64; 2] {
     out
 }
 
-/// Things that stand around a robot of this reach, metres, each with this chance.
-fn around(scene: &mut Scene, chance: f64, reach: f64, random: &mut Random) {
+/// Objects around a robot of this reach (metres), each with this probability.
+fn add_clutter(scene: &mut Scene, chance: f64, reach: f64, random: &mut Random) {
     let there = |random: &mut Random| random.unit() < chance;
     // Beside the robot, so far beyond its reach.
     let beside = |random: &mut Random, gap: [f64; 2]| {

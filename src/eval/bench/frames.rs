@@ -1,6 +1,6 @@
-//! Seeds and sizes in; plants whose new scans are in frames that are drawn, and lines of equal
-//! cells, out: which of them a rescan laid on the plant, how exactly, which it refused, and which
-//! it laid on a wrong place.
+//! The suites of the rescan bench with new scans in other frames, and with lines of equal cells:
+//! which are registered to the plant and how exactly, which are refused, and which are placed
+//! wrongly.
 
 use super::cases::{CaseRow, CaseToRun, Cases};
 use super::request::{RescanBench, RescanSuite};
@@ -24,11 +24,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-/// Shift of a frame, metres, at most.
+/// Greatest shift of a frame, metres.
 const SHIFT: f64 = 50.0;
-/// A scan that is laid farther off than this is wrong: metres, radians (0.02°).
+/// Error of a scan's pose beyond which its place is wrong: metres, radians (0.02°).
 const EXACT: (f64, f64) = (0.003, 0.000_349);
-/// Cells of a line.
+/// Number of cells of a line.
 const N_CELLS: usize = 5;
 
 /// One case.
@@ -36,7 +36,7 @@ const N_CELLS: usize = 5;
 struct FrameRow {
     seed: u64,
     failed: Option<String>,
-    /// What stands at the ends of a line.
+    /// Objects at the ends of a line.
     ends: Option<String>,
     /// Shift in the plan, metres, and yaw, degrees, of the frame.
     frame: [f64; 3],
@@ -48,14 +48,13 @@ struct FrameRow {
     /// contradicted.
     share: f64,
     margin: Option<i64>,
-    /// Why it was refused.
+    /// Reason of a refusal.
     why: Option<String>,
     /// Seconds of the rescan.
     seconds: f64,
 }
 
-/// Draws plants or lines whose new scans are in frames of their own, and rescans them; returns the
-/// table.
+/// Draws plants or lines with new scans in other frames, rescans them, and returns the table.
 pub fn frames(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {
     let temporary = tempfile::tempdir()?;
     let robots = bench.drawn.library(temporary.path())?;
@@ -72,7 +71,7 @@ pub fn frames(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<Str
     place.run(cases, case, table, engine)
 }
 
-/// Which case is asked for, and what it is done with.
+/// The case that is run, with library and folders.
 struct FrameCase<'a> {
     bench: &'a RescanBench,
     number: usize,
@@ -151,7 +150,7 @@ fn drawn(row: &mut FrameRow) -> Pose {
     Pose::from_parts(Translation3::from(shift), turn)
 }
 
-/// Compares poses of the new scans, as they were laid, with the true ones.
+/// Compares the registered poses of the new scans with the true ones.
 fn judge(row: &mut FrameRow, then: &Scene, now: &Scene, out: &Path) -> Result<()> {
     let laid = &PlantState::read(&VerifiedFiles::open(out)?)?.scans[then.scanners.len()..];
     for (scan, scanner) in laid.iter().zip(&now.scanners) {

@@ -1,10 +1,10 @@
-//! Rows as they come in; a file with one JSON object a line out.
+//! Writes rows to a file as they come, one JSON object per line.
 
 use contract::{Error, Kind, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Rows as they come, one JSON object a line: a run that is stopped has lost nothing.
+/// A file of rows that is written row by row, so that a stopped bench has lost nothing.
 pub(super) struct Journal(std::fs::File, PathBuf);
 
 impl Journal {

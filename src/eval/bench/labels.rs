@@ -1,30 +1,30 @@
-//! What the points of a cell are said to be, and what they are, in; how well links, hoses and fixed
-//! points are told out.
+//! Compares the labels of a cell's points with the truth: links, hoses and fixed points.
 
 use super::cell::FoundInCell;
 use crate::eval::confusion::Confusion;
 use contract::{Label, MaskId};
 use serde::Serialize;
 
-/// A link with fewer points has no say in the median of links.
+/// Least number of points of a link that enters the median of links.
 pub(super) const MIN_LINK_POINTS: u64 = 50;
 
-/// How well the labels of a case are.
+/// Agreement of the labels of a case with the truth.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct LabelScores {
     /// Intersection over union of each link of the robot that has points enough.
     pub(super) links: Vec<f64>,
-    /// Points of hoses that hang on the robot: said to move, and all.
+    /// Points of hoses on the robot: those labelled as moving, and all.
     pub(super) hoses: [u64; 2],
-    /// Points of all that hangs on the robot, hoses, tool and part: said to move, and all.
+    /// Points of everything attached to the robot (hoses, tool, part): those labelled as moving,
+    /// and all.
     pub(super) attached: [u64; 2],
-    /// Points that stand still: all, and those said to move.
+    /// Fixed points: all, and those labelled as moving.
     pub(super) fixed: [u64; 2],
 }
 
 impl LabelScores {
-    /// Compares the labels with the truth, where robot 0 is what the fit `here` found, if any did,
-    /// with so many links. Of points of other robots nothing is asked.
+    /// Compares the labels with the truth, where robot 0 is the fit `here`, if there is one, with
+    /// so many links. Points of other robots are ignored.
     pub(super) fn of(found: &FoundInCell, here: Option<usize>, n_links: usize) -> Option<Self> {
         let (near, truth) = found.labels.as_ref()?;
         let mut tally = Confusion::new(std::iter::once(n_links));
@@ -45,7 +45,7 @@ impl LabelScores {
     }
 }
 
-/// Share of counts `[part, whole]`; none of nothing.
+/// Ratio of the counts `[part, whole]`; `None` for an empty whole.
 pub(super) fn share_of([part, whole]: [u64; 2]) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
 }

@@ -1,5 +1,5 @@
-//! A file and a folder in; what this machine can do at best out: copying the file, copying memory.
-//! A run is measured against both, in the same minute.
+//! Measures the limits of the machine, copying a file and copying memory, at the same time as a run
+//! that is compared with them.
 
 use contract::{Error, Result};
 use serde::Serialize;
@@ -8,23 +8,23 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::time::Instant;
 
-/// Bytes that are read and written at a time, as `cp` does.
+/// Size of the blocks of a copy, bytes, as `cp` uses.
 const PIECE: usize = 1 << 20;
-/// Buffers of the memory test, bytes: more than any cache.
+/// Size of the buffers of the memory test, bytes: more than any cache.
 const BUFFER: usize = 128 << 20;
-/// Times that memory is copied; the median counts.
+/// Number of copies in memory; the median counts.
 const N_COPIES: usize = 7;
 
-/// A copy of a file, cold, synced.
+/// Time of a synced copy of an uncached file.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Copied {
-    /// Bytes that were copied: all of the file, or what the disk has room for.
+    /// Number of copied bytes: the whole file, or as much as the disk has room for.
     pub(super) n_bytes: u64,
     pub(super) seconds: f64,
 }
 
 impl Copied {
-    /// The time that a whole file of this length takes.
+    /// The time for a whole file of this length, seconds.
     pub(super) fn seconds_for(&self, n_bytes: u64) -> f64 {
         self.seconds * n_bytes as f64 / self.n_bytes.max(1) as f64
     }
@@ -58,11 +58,11 @@ pub(super) fn copy(path: &Path, most: u64) -> Result<Copied> {
     Ok(Copied { n_bytes: copied.map_err(failed)?, seconds })
 }
 
-/// Has the system forget what it keeps of a file in memory, so that it is read from disk.
+/// Drops a file from the page cache, so that it is read from disk.
 pub(super) fn forget(path: &Path) -> Result<()> {
     let failed = |e: std::io::Error| Error::from(e).at(path.display());
     let file = File::open(path).map_err(failed)?;
-    // What is not on disk yet cannot be forgotten.
+    // Pages that are not written to disk yet cannot be dropped.
     file.sync_all().map_err(failed)?;
     #[cfg(target_os = "linux")]
     rustix::fs::fadvise(&file, 0, None, rustix::fs::Advice::DontNeed)
@@ -70,7 +70,7 @@ pub(super) fn forget(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Bytes a second that one thread copies in memory: read and written bytes both count.
+/// Bytes per second that one thread copies in memory; read and written bytes both count.
 pub(super) fn memory() -> f64 {
     let from = vec![1_u8; BUFFER];
     let mut to = vec![0_u8; BUFFER];

@@ -1,5 +1,5 @@
-//! Benches: cells and plants drawn from seeds, scanned and searched; errors against the truth, and
-//! speed and memory beside the machine's limits, as tables.
+//! Benches: random cells and plants are scanned and processed; tables compare results with the
+//! truth, and speed and memory with the limits of the machine.
 
 pub mod accuracy;
 mod carried_items;

@@ -1,6 +1,5 @@
-//! A drawn robot in; what stands in the way of its scanners as METHOD.md §19 (T6) has it out:
-//! plates about its foot, a conveyor that touches it, a fence on three sides, another robot whose
-//! arm crosses it.
+//! Obstacles around a random robot (METHOD.md §19, T6): plates about its foot, a conveyor that
+//! touches it, a fence on three sides, and another robot whose arm crosses it.
 
 use super::condition::{Condition, DrawnCase};
 use contract::Result;
@@ -13,19 +12,19 @@ use simulate::{Postures, Scene};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Plates stand so far from the foot and are so thick, metres.
+/// Distance of plates from the foot, and their thickness, metres.
 const PLATES: [f64; 2] = [0.05, 0.005];
 /// A conveyor's length, width and height, metres: lower than most arms reach.
 const CONVEYOR: [f64; 3] = [1.5, 0.6, 0.4];
-/// Ways that it may lie from the foot.
+/// Number of directions in which it may lie from the foot.
 const N_WAYS: usize = 12;
-/// Other robots stand so far beyond the reach of the first, metres.
+/// Distance of another robot beyond the reach of the first, metres.
 const BESIDE: [f64; 2] = [0.3, 0.8];
-/// Of so many of their postures the one that comes nearest.
+/// Number of random postures, of which the one that comes nearest is taken.
 const N_POSTURES: usize = 6;
-/// Two robots are no nearer than about this, metres …
+/// Least distance between two robots, metres.
 const CLEAR: f64 = 0.08;
-/// … and no robot's arm is so near to where scanners stand, metres.
+/// Least distance between an arm and a scanner, metres.
 const ASIDE: f64 = 0.8;
 
 /// The robot as it was drawn.
@@ -33,16 +32,17 @@ pub(super) struct Standing<'a> {
     pub(super) model: &'a Model,
     pub(super) world_from_base: Pose,
     pub(super) posture: &'a [f64],
-    /// How far it reaches from its base, metres.
+    /// Its reach from the base, metres.
     pub(super) reach: f64,
-    /// How far from the origin scanners stand, metres.
+    /// Distance of the scanners from the origin, metres.
     pub(super) circle: f64,
 }
 
-/// Adds what the case's condition says; the base of another robot, world, where it wants one.
+/// Adds the obstacles of the case's condition; returns the base of another robot, world frame, if
+/// there is one.
 ///
 /// # Errors
-/// `BadInput` where that has no room.
+/// `BadInput` where there is no room for them.
 pub(super) fn add(
     scene: &mut Scene,
     robot: &Standing<'_>,
@@ -89,8 +89,8 @@ fn plates(
     }
 }
 
-/// A conveyor that ends at the plates of a foot of a radius, metres, where the arm is least in its
-/// way.
+/// A conveyor that ends at the plates around a foot with this radius, metres, in the direction
+/// where the arm is least in its way.
 fn conveyor(
     scene: &mut Scene,
     robot: &Standing<'_>,
@@ -140,7 +140,7 @@ fn fences(scene: &mut Scene, robot: &Standing<'_>, random: &mut Random) {
     }
 }
 
-/// Puts another robot of the same model beside one, its arm across it; where its base is.
+/// Adds another robot of the same model whose arm crosses the first one; returns its base.
 fn cross(scene: &mut Scene, robot: &Standing<'_>, random: &mut Random) -> Result<Vector> {
     let (base, way) = (robot.world_from_base.translation.vector, random.between(0.0, TAU));
     let apart = robot.reach + random.between(BESIDE[0], BESIDE[1]);

@@ -1,5 +1,5 @@
-//! Rows in; tables of what is measured otherwise than by suites out: the source's Table 1, closed
-//! loops, the basin.
+//! Tables that do not follow the suites: the paper's Table 1, closed loops, and the basin of
+//! convergence.
 
 use super::score::{AccuracyRow, JointRow};
 use contract::{Calibration, JointFrame};
@@ -75,8 +75,8 @@ fn table_1(rows: &[AccuracyRow]) -> String {
 const WAYS: [&str; 5] =
     ["registration", "sequential", "sequential-adjusted", "scans-held", "from-truth"];
 
-/// What others reach in the cells of `registration` that all of them were given, and what none can
-/// better, over the joints that the product says there to be determined.
+/// Errors of the baselines in the cells of `registration` that all methods solved, with the best
+/// possible ones, over joints that the product states as determined.
 fn baselines(rows: &[AccuracyRow]) -> String {
     let given = |way: &str| rows.iter().any(|r| r.suite == way);
     let ways: Vec<&str> = WAYS.into_iter().filter(|way| given(way)).collect();
@@ -140,8 +140,7 @@ fn loops(rows: &[AccuracyRow]) -> String {
     out
 }
 
-/// Where joints are against their models, found from single postures and from all of a robot's
-/// together.
+/// Errors of calibrated joints, from single postures and from all postures of a robot together.
 fn calibration(rows: &[AccuracyRow]) -> String {
     let mut out = String::new();
     for model in models(rows, "calibration") {
@@ -216,7 +215,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / f64::from(n.max(1))).sqrt()
 }
 
-/// How near a search must come.
+/// Convergence basin: how close to the truth a search must start.
 fn basin(rows: &[AccuracyRow]) -> String {
     let mut steps: Vec<f64> =
         rows.iter().filter(|r| r.n_starts > 0).map(|r| r.perturbed_deg).collect();

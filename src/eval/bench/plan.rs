@@ -1,6 +1,5 @@
-//! `bench plan`: a seed in; halls drawn from it, each with a library of its own, scanned to files,
-//! asked what they will take and then done; what was predicted beside what was measured, out. The
-//! rows hold what `scripts/plan_rates.py` measures rates from.
+//! `bench plan`: draws halls with their own libraries, estimates each with `plan`, runs it, and
+//! compares prediction and measurement. `scripts/plan_rates.py` computes the rates from its rows.
 
 use super::journal::Journal;
 use super::process_watch::{Watched, watch};
@@ -19,14 +18,14 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What is asked for.
+/// Request of the bench.
 #[derive(Debug, Clone)]
 pub struct PlanBench {
-    /// Halls.
+    /// Number of halls.
     pub n_halls: usize,
-    /// Number of the first of them.
+    /// Number of the first hall.
     pub first: usize,
-    /// Seed of all that is drawn.
+    /// Seed of all random values.
     pub seed: u64,
     /// Robot library that the halls' own libraries are chosen from.
     pub robots: PathBuf,
@@ -36,7 +35,7 @@ pub struct PlanBench {
     pub keep: bool,
 }
 
-/// Robots that stand in a hall: empty ones, and crowded ones.
+/// Numbers of robots in a hall: none, and many.
 const N_ROBOTS: [usize; 10] = [0, 1, 1, 2, 3, 4, 5, 6, 8, 10];
 /// Beams of a hall, fewest and most.
 const BEAMS: [f64; 2] = [2e6, 30e6];
@@ -46,7 +45,7 @@ const N_MODELS: [usize; 2] = [3, 12];
 const N_SCANS: [usize; 2] = [2, 12];
 const MORE_SCANS: usize = 3;
 
-/// What a hall is drawn from.
+/// Random values of a hall.
 struct Hall {
     seed: u64,
     n_robots: usize,
@@ -66,7 +65,7 @@ struct PlanRow {
     library_bytes: u64,
     format: Scanned,
     n_threads: usize,
-    /// What `plan` said, and how long it took, seconds.
+    /// Estimate of `plan`, and its time, seconds.
     planned: Estimate,
     plan_seconds: f64,
     /// The run: its stages, time, processor time and memory.
@@ -74,8 +73,8 @@ struct PlanRow {
     /// Bytes of the store and of what was written.
     store_bytes: u64,
     output_bytes: u64,
-    /// Processes that waited for a processor, about: the mean over the minute before the end,
-    /// where the system tells.
+    /// Mean number of processes that waited for a processor in the last minute, where the system
+    /// states it.
     load: f64,
 }
 
@@ -199,8 +198,8 @@ fn load() -> f64 {
 }
 
 impl PlanRow {
-    /// Processor time of the run, shared among its threads, seconds: its time on a machine that
-    /// does nothing else.
+    /// Processor time of the run divided by its threads, seconds: its time on an otherwise idle
+    /// machine.
     fn alone(&self) -> f64 {
         self.measured.cpu_seconds / self.n_threads as f64
     }
@@ -220,7 +219,7 @@ fn line(row: &PlanRow) -> String {
     )
 }
 
-/// Predicted beside measured, a line each.
+/// Predicted and measured values, one line per hall.
 fn table(rows: &[PlanRow]) -> String {
     let mut out = String::from(
         "| hall | robots | models | M points | plan took, s | time planned, s | measured, s | processors / threads, s | that / planned | memory planned | measured | disk planned | measured | load |\n",

@@ -1,5 +1,5 @@
-//! `bench plant`: suites of drawn cells and lines in; scanned to files, sent through the main job,
-//! and compared with the truth robot by robot and point by point, as a table, out.
+//! `bench plant`: runs the main job on suites of random cells and lines from files, and compares
+//! robots and labels with the truth, as a table.
 
 use super::cases::{CaseRow, CaseToRun, Cases};
 use super::condition;
@@ -24,7 +24,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What is asked for.
+/// Request of the bench.
 #[derive(Debug, Clone)]
 pub struct PlantBench {
     /// Seed, library and folders.
@@ -46,7 +46,7 @@ const CELL: Plant = Plant {
     moves: false,
 };
 
-/// What a case is drawn from.
+/// Kind of the plant of a case.
 enum Drawing {
     /// A plant, all of whose robots are known.
     Plant(Plant),
@@ -93,7 +93,7 @@ fn shift(scanner: &mut Scanner, seed: u64, k: usize) {
 /// A suite: name, number of cases, and what the k-th is drawn from.
 type PlantSuite = (&'static str, usize, fn(usize) -> Drawing);
 
-/// Name of the suite whose robots nobody knows.
+/// Name of the suite whose robots are missing in the library.
 const STRANGERS: &str = "strangers";
 
 const SUITES: &[PlantSuite] = &[
@@ -112,7 +112,7 @@ const SUITES: &[PlantSuite] = &[
     ("mounts", 12, |k| Drawing::Hung([Mounting::Ceiling, Mounting::Wall, Mounting::Tilted][k % 3])),
 ];
 
-/// A thing with fewer points is not asked whether it was lost.
+/// Least number of points of an object that is examined for wrong labels.
 const MIN_OBJECT_POINTS: u64 = 200;
 
 /// One case.
@@ -184,7 +184,7 @@ fn cases(bench: &PlantBench) -> Result<Vec<CaseToRun<PlantRow, Drawing>>> {
 struct KnownRobots {
     folder: PathBuf,
     models: Vec<Model>,
-    /// Where the first run leaves them as it loaded them, for those after it.
+    /// Folder of loaded models, which the first run fills for later ones.
     kept: PathBuf,
 }
 
@@ -372,7 +372,7 @@ fn figures(own: &[&PlantRow]) -> String {
         let index = ((all.len() as f64 - 1.0) * share).round().max(0.0) as usize;
         all.get(index).map_or("–".into(), |v| format!("{v:.digits$}"))
     };
-    // What no robot explains is not to be labelled as one's.
+    // Points of unknown robots must not be labelled as those of a known one.
     let is_asked = |r: &PlantRow| r.n_robots > 0 && r.suite != STRANGERS;
     let f1 = sorted(&|r| if is_asked(r) { vec![r.f1] } else { vec![] });
     let ious = sorted(&|r| r.ious.clone());

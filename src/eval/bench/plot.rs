@@ -1,5 +1,5 @@
-//! Rows in; two pictures as SVG out: how the errors of each suite are spread, and how they compare
-//! with what was stated.
+//! Two plots as SVG: the distribution of the errors of each suite, and their comparison with the
+//! stated deviations.
 
 use super::score::AccuracyRow;
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ const Z: f64 = 4.0;
 const COLOURS: [&str; 8] =
     ["#1f77b4", "#d62728", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b", "#17becf", "#7f7f7f"];
 
-/// Share of the determined joints with an error up to so much, suite by suite.
+/// Cumulative distribution of the errors of determined joints, suite by suite.
 pub(super) fn errors(rows: &[AccuracyRow]) -> String {
     let x = |e: f64| {
         let t = (e.clamp(ERRORS[0], ERRORS[1]) / ERRORS[0]).ln() / (ERRORS[1] / ERRORS[0]).ln();
@@ -31,7 +31,8 @@ pub(super) fn errors(rows: &[AccuracyRow]) -> String {
     picture("share of determined joints against error", &ticks, series.collect(), x)
 }
 
-/// Share of the determined joints with a z up to so much; the last line is what it should be.
+/// Cumulative distribution of error over stated deviation of determined joints; the last line is
+/// the ideal one.
 pub(super) fn reliability(rows: &[AccuracyRow]) -> String {
     let x = |z: f64| MARGIN[0] + z.clamp(0.0, Z) / Z * (SIZE[0] - 2.0 * MARGIN[0] - 100.0);
     let ticks: Vec<(f64, String)> = (0..=4).map(|z| (x(f64::from(z)), z.to_string())).collect();

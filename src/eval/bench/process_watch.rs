@@ -1,5 +1,5 @@
-//! A command of this program in; how long it took, stage by stage, and how much memory it had
-//! resident, out.
+//! Runs a command of this program in its own process, and records the time of each stage and its
+//! resident memory.
 
 use crate::job::Means;
 use contract::{Error, Kind, Result};
@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time between two looks at a process.
+/// Time between two samples of a process.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// One stage of a run.
@@ -24,7 +24,7 @@ pub(super) struct StageTime {
     pub(super) cpu_seconds: f64,
 }
 
-/// What was seen.
+/// Measurements of a process.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Watched {
     pub(super) seconds: f64,

@@ -1,4 +1,4 @@
-//! What a bench is asked for: which cases of which seed, with which robots, and where rows go.
+//! Requests of benches: cases, seeds, robots, and folders for rows.
 
 use crate::eval::demo;
 use contract::{Error, Kind, Result};
@@ -7,12 +7,12 @@ use simulate::Plant;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Cases that are drawn from a seed.
+/// Random cases of a seed.
 #[derive(Debug, Clone)]
 pub struct DrawnCases {
     /// Number of the first case.
     pub first: usize,
-    /// Seed of all.
+    /// Seed of all cases.
     pub seed: u64,
     /// Robot library; the demo's robots where left out.
     pub robots: Option<PathBuf>,
@@ -33,7 +33,7 @@ impl DrawnCases {
         self.seed * 100_000 + number as u64
     }
 
-    /// The library that is asked for; else the demo's, written below a folder.
+    /// The requested library, else that of the demo, written to a folder.
     pub(super) fn library(&self, folder: &Path) -> Result<PathBuf> {
         if let Some(dir) = &self.robots {
             return Ok(dir.clone());
@@ -70,19 +70,19 @@ impl PlantSize {
     }
 }
 
-/// What is drawn.
+/// Suite of the rescan bench.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum RescanSuite {
     /// Plants of which one cell is scanned again, in the plant's frame.
     #[default]
     Same,
-    /// The same, the new scans in frames that are drawn.
+    /// Plants of which one cell is scanned again, in random frames.
     Frames,
-    /// Lines of equal cells, the new scans in frames that are drawn.
+    /// Lines of equal cells with the new scans in random frames.
     Lines,
 }
 
-/// What is asked for.
+/// Request of the rescan bench.
 #[derive(Debug, Clone)]
 pub struct RescanBench {
     /// Seed, library and folders.
@@ -97,7 +97,7 @@ pub struct RescanBench {
     pub alone: bool,
 }
 
-/// Refuses names of suites that there are none of.
+/// Refuses names of unknown suites.
 pub(super) fn check_suites(asked: &[String], names: &[&str]) -> Result<()> {
     match asked.iter().find(|s| !names.contains(&s.as_str())) {
         None => Ok(()),
@@ -106,7 +106,7 @@ pub(super) fn check_suites(asked: &[String], names: &[&str]) -> Result<()> {
     }
 }
 
-/// Indices of the robots whose names are asked for.
+/// Indices of the robots with the requested names.
 pub(super) fn chosen(models: &[Model], names: &[String]) -> Result<Vec<usize>> {
     let wanted = |m: &Model| names.is_empty() || names.iter().any(|n| m.name.contains(n.as_str()));
     let out: Vec<usize> =

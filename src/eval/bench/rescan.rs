@@ -1,5 +1,5 @@
-//! Seeds and sizes in; plants of which one cell is scanned again, what the rescan found of what was
-//! changed, what it invented, and its time beside a run of the whole, out.
+//! `bench rescan`: draws plants of which one cell is scanned again, and reports which changes a
+//! rescan has found, which it has invented, and its time beside a run of the whole plant.
 
 use super::cases::{CaseRow, CaseToRun, Cases};
 use super::process_watch::{command, watch};
@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// A found thing nearer to a true one than this is it, metres.
+/// Distance below which a found body is a true one, metres.
 const SAME_THING: f64 = 0.35;
 
 /// One case.
@@ -34,20 +34,20 @@ struct RescanRow {
     robot: bool,
     pallet: bool,
     barrel: bool,
-    /// Where it stood was said not to have been looked at.
+    /// Whether its earlier place was reported as not compared.
     unseen: bool,
-    /// Changes that are none, in words.
+    /// Messages about wrong changes.
     invented: Vec<String>,
     /// Robots that were found, and all of the plant.
     n_robots: [usize; 2],
     /// Largest error of a determined joint of the robot that moved, degrees: rescan, and a run of
     /// the new scans alone.
     joint: [f64; 2],
-    /// F1 of moving points in the cell, likewise.
+    /// F1 score of moving points in the cell, likewise.
     f1: [f64; 2],
-    /// Registration that is left, metres: least and largest of the scans.
+    /// Remaining registration error, metres: least and greatest of the scans.
     left: [f64; 2],
-    /// Tiles that are the same bytes, and all of the base.
+    /// Number of tiles with unchanged bytes, and of all tiles of the earlier result.
     n_same: [usize; 2],
     seconds: [f64; 2],
 }
@@ -152,7 +152,7 @@ fn judge(row: &mut RescanRow, then: &Scene, now: &Scene, out: &Path) -> Result<(
     Ok(())
 }
 
-/// Robots that are said to differ: the first one moved, no other did.
+/// Compares the reported robots: the first one moved, no other did.
 fn judge_robots(row: &mut RescanRow, robots: &[Value], now: &Scene, result: &ResultFile) {
     let base = Vector::from(now.robots[0].xyz);
     for robot in robots.iter().filter(|r| r["change"]["kind"] != "same") {
@@ -167,8 +167,7 @@ fn judge_robots(row: &mut RescanRow, robots: &[Value], now: &Scene, result: &Res
     }
 }
 
-/// Things that are said to differ: the pallet is elsewhere now, and the barrel, which stood at this
-/// place, is gone.
+/// Compares the reported bodies: the pallet was moved, and the barrel at this place is gone.
 fn judge_things(
     row: &mut RescanRow,
     things: &[Value],
@@ -202,7 +201,7 @@ fn judge_things(
     }
 }
 
-/// How far scans are off beyond what was found, metres: least and largest.
+/// Remaining registration error of the scans, metres: least and greatest.
 fn left(scans: &[Value], now: &Scene) -> [f64; 2] {
     let off = scans.iter().zip(&now.scanners).map(|(found, scanner)| {
         let shift = Vector::from([0, 1, 2].map(|i| found["shift"][i].as_f64().unwrap_or(f64::NAN)));

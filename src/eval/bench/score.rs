@@ -1,4 +1,4 @@
-//! A drawn cell and what was found in it in; one row of figures out.
+//! Scores a case: compares what was found in a random cell with the truth, as one row of figures.
 
 use super::cell::{FoundInCell, Start};
 use super::condition::DrawnCase;
@@ -9,19 +9,19 @@ use geometry::{Point, Pose, Vector, angle};
 use robot::{JointKind, Model, Role};
 use serde::Serialize;
 
-/// A fit farther than this from the true base is not it, metres.
+/// Distance of bases beyond which a fit is not the true robot, metres.
 const SAME_PLACE: f64 = 0.5;
-/// A joint is right within this, radians (0.3°) or metres …
+/// Greatest error of a correct joint, radians (0.3°) or metres.
 const RIGHT: f64 = 0.005_236;
-/// … or within so many of its stated standard deviations, where the fit says that the points do not
-/// determine it.
+/// Greatest error of a correct joint that the fit states as undetermined, in its standard
+/// deviations.
 const RIGHT_SIGMAS: f64 = 4.0;
-/// Other holes of a flange are told by sweeps in steps of a degree: right within this, radians
-/// (2°).
+/// Tolerance of the angles of alternative holes of a flange, radians (2°): they come from sweeps in
+/// steps of a degree.
 const NEARLY_RIGHT: f64 = 0.035;
-/// From this standard deviation on a joint is said to be open: nothing is claimed of it, radians.
+/// Standard deviation beyond which a joint counts as open, so that nothing is claimed, radians.
 const OPEN: f64 = 0.02;
-/// The base is right within this, metres: three standard deviations of a usual registration.
+/// Greatest error of a correct base, metres: three standard deviations of a usual registration.
 const RIGHT_BASE: f64 = 0.010;
 /// Samples of a link for the displacement of its surface.
 const N_SAMPLES: usize = 200;
@@ -31,9 +31,9 @@ const N_SAMPLES: usize = 200;
 pub(super) struct JointRow {
     pub(super) name: String,
     pub(super) truth: f64,
-    /// That of the sweep alone, where the method goes link after link.
+    /// Error after the sweep, for the link-by-link method.
     pub(super) rough: Option<f64>,
-    /// Whole turns taken out, radians or metres.
+    /// Error without whole turns, radians or metres.
     pub(super) error: f64,
     pub(super) sigma: f64,
     pub(super) determined: bool,
@@ -45,22 +45,22 @@ pub(super) struct JointRow {
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct AccuracyRow {
     pub(super) suite: String,
-    /// Whether it is of a method that the product is measured against.
+    /// Whether it belongs to a baseline.
     pub(super) is_baseline: bool,
     pub(super) model: String,
     pub(super) seed: u64,
     pub(super) n_scanners: usize,
     pub(super) n_robot_points: usize,
-    /// Why there is no result, where there is none.
+    /// Error message of a failed case.
     pub(super) failed: Option<String>,
     pub(super) found: Option<String>,
     pub(super) verdict: String,
     pub(super) right_model: bool,
-    /// Model, base and every joint of which something is claimed.
+    /// Whether model, base and every claimed joint are correct.
     pub(super) right: bool,
-    /// Robots reported that are not there.
+    /// Number of reported robots that do not exist.
     pub(super) n_invented: usize,
-    /// Which, how sure, and how far from the true robot's base.
+    /// Their models, verdicts and distances from the true robot's base.
     pub(super) invented: Vec<String>,
     /// Metres, radians.
     pub(super) base: [f64; 2],
@@ -72,7 +72,7 @@ pub(super) struct AccuracyRow {
     /// Largest turn and shift of a sub link in the base's frame, radians and metres; zero without
     /// such links.
     pub(super) sub: [f64; 2],
-    /// How far its loops are open, metres.
+    /// Gap of its closed loops, metres.
     pub(super) loop_gap: f64,
     /// Of the refinement alone: how far its starts were off, degrees, how many there were, and how
     /// many came home.
@@ -84,9 +84,9 @@ pub(super) struct AccuracyRow {
     pub(super) margin: Option<f64>,
     pub(super) reasons: Vec<String>,
     pub(super) seconds: f64,
-    /// How well its points are labelled.
+    /// Scores of its labels.
     pub(super) labels: Option<LabelScores>,
-    /// Where joints were found to be and where they are, where that was asked for.
+    /// Found and true joint axes, where calibration was requested.
     #[serde(skip)]
     pub(super) calibration: Option<(Calibration, Vec<Pose>)>,
 }
@@ -144,7 +144,7 @@ impl AccuracyRow {
         self
     }
 
-    /// For people who watch.
+    /// One line for people who watch the bench.
     pub(super) fn line(&self) -> String {
         let what = match (&self.failed, &self.found) {
             (Some(why), _) => format!("failed: {why}"),
@@ -234,8 +234,7 @@ pub(super) fn score(
     row
 }
 
-/// Where a fit found the joints to be and where they are, each as it is from the model, where that
-/// was asked for.
+/// Found and true joint axes of a fit, each relative to the model, where calibration was requested.
 fn calibration(
     case: &DrawnCase,
     models: &[Model],
@@ -249,7 +248,7 @@ fn calibration(
     Some((found.clone(), model.free.iter().map(moved).collect()))
 }
 
-/// Whether a fit is that of the other robot of a cell, of which nothing is asked.
+/// Whether a fit belongs to the other robot of a cell, which is not scored.
 fn is_beside(fit: &Fit, model: &Model, drawn: &DrawnCell) -> bool {
     let apart = |base: Vector| (fit.world_from_base.translation.vector - base).norm();
     fit.model_name == model.name && drawn.beside.is_some_and(|base| apart(base) < SAME_PLACE)
@@ -286,7 +285,7 @@ fn bolted_elsewhere(mount: &Mount, joint: usize, fit: &Fit, posture: &[f64]) -> 
     tool.alike.iter().map(error).any(|e| angle::apart(e, 0.0) < NEARLY_RIGHT)
 }
 
-/// Whether what is claimed of a joint holds.
+/// Whether the claim about a joint is true.
 fn is_right(joint: &JointRow, index: usize, fit: &Fit) -> bool {
     let near = |e: f64| angle::apart(e, 0.0) < RIGHT;
     if near(joint.error) {

@@ -1,5 +1,5 @@
-//! A model in; the same as a real robot differs from it out: its surface off by a smooth field
-//! along its normals, as castings are, or its joints elsewhere.
+//! Deforms a model as real robots differ from theirs: a smooth displacement of the surface along
+//! its normals, as castings have, a missing cover, a larger link, or shifted joints.
 
 use geometry::{Pose, Vector};
 use robot::{JointKind, Model};
@@ -8,13 +8,13 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Waves that are added up.
+/// Number of waves in the sum.
 const N_WAVES: usize = 3;
 /// Largest wave number on an axis, radians a metre: waves of 0.8 m and longer.
 const WAVE_NUMBER: f64 = 8.0;
-/// Share of a link's size that its cover is deep.
+/// Depth of a cover as a share of the link's size.
 const COVER: f64 = 0.125;
-/// Vertices of one corner that triangles do not share are one if they agree to this, metres.
+/// Distance below which vertices of different triangles count as one corner, metres.
 const WELD: f32 = 1e-4;
 
 /// Moves the surface of each link along its normals by about `amplitude` metres at most: all around

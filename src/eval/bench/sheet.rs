@@ -1,4 +1,4 @@
-//! Rows of cells in; the text of a CSV file out.
+//! Encodes rows of cells as CSV.
 
 use contract::{Error, Kind, Result};
 

@@ -1,4 +1,4 @@
-//! Rows in; the table for people and the one for programs out.
+//! Tables of the accuracy bench for people and for programs.
 
 use super::labels::{LabelScores, share_of};
 use super::score::AccuracyRow;
@@ -79,10 +79,10 @@ fn line(out: &mut String, name: &str, rows: &[&AccuracyRow]) {
         millimetres(&|r| r.surface[1]),
         rms(&z),
         share * 100.0,
-        shares(told(&right, |t| t.links.clone()), f64::min, 1.0, 4),
-        shares(told(&right, |t| share_of(t.hoses).into_iter().collect()), f64::min, 100.0, 2),
+        shares(scores(&right, |t| t.links.clone()), f64::min, 1.0, 4),
+        shares(scores(&right, |t| share_of(t.hoses).into_iter().collect()), f64::min, 100.0, 2),
         shares(
-            told(rows, |t| share_of([t.fixed[1], t.fixed[0]]).into_iter().collect()),
+            scores(rows, |t| share_of([t.fixed[1], t.fixed[0]]).into_iter().collect()),
             f64::max,
             100.0,
             4
@@ -96,11 +96,11 @@ fn degrees(rows: &[&AccuracyRow], each: impl Fn(&AccuracyRow) -> Vec<f64>) -> Ve
 }
 
 /// Figures of the labels of each case.
-fn told(rows: &[&AccuracyRow], each: impl Fn(&LabelScores) -> Vec<f64>) -> Vec<f64> {
+fn scores(rows: &[&AccuracyRow], each: impl Fn(&LabelScores) -> Vec<f64>) -> Vec<f64> {
     rows.iter().filter_map(|r| r.labels.as_ref()).flat_map(each).collect()
 }
 
-/// Median and worst of shares, as multiples of a factor; a dash where there are none.
+/// Median and worst of shares, multiplied by a factor; a dash without shares.
 fn shares(
     mut values: Vec<f64>,
     worst: impl Fn(f64, f64) -> f64,

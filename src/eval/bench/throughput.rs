@@ -1,6 +1,6 @@
-//! `bench throughput`: sizes of plants in; each drawn, scanned to files and sent through the main
-//! job in a process of its own; points a second of every stage beside what the machine can do, and
-//! resident memory, out.
+//! `bench throughput`: draws plants of given sizes, scans them to files and runs the main job in
+//! its own process. Reports points per second of every stage beside the limits of the machine, and
+//! resident memory.
 
 use super::machine_limits::{Copied, copy, forget, memory};
 use super::process_watch::{Watched, command, watch};
@@ -16,16 +16,16 @@ use simulate::Plant;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// What is asked for.
+/// Request of the bench.
 #[derive(Debug, Clone)]
 pub struct ThroughputBench {
     /// Beams of each plant.
     pub sizes: Vec<u64>,
-    /// Scanners; as many as give each 50 million beams where left out.
+    /// Number of scanners; `None` for one per 50 million beams.
     pub n_scans: Option<usize>,
-    /// Robots that stand in it.
+    /// Number of robots of each plant.
     pub n_robots: usize,
-    /// Times that each is run; medians count.
+    /// Number of runs of each plant; the median counts.
     pub n_runs: usize,
     /// Format of the scans.
     pub format: Scanned,
@@ -33,15 +33,15 @@ pub struct ThroughputBench {
     pub seed: u64,
     /// Robot library; the demo's robots where left out.
     pub robots: Option<PathBuf>,
-    /// Where scans, results and figures go.
+    /// Folder of scans, results and figures.
     pub out: PathBuf,
     /// Whether scans are kept: the next bench of the same plant finds them.
     pub keep: bool,
-    /// Whether what is true of each point is written beside them.
+    /// Whether the truth of each point is written beside the scans.
     pub truth: bool,
 }
 
-/// What the virtual scanner writes.
+/// Format that the virtual scanner writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Scanned {
@@ -53,7 +53,7 @@ pub enum Scanned {
     E57,
 }
 
-/// Beams of one scan where it is not said how many scans there are: a full scan of a common
+/// Number of beams of one scan where the number of scans is not given: a full scan of a common
 /// scanner.
 const SCAN_BEAMS: u64 = 50_000_000;
 /// Most bytes that are copied to measure the disk: where the disk is short, the rest is taken in
@@ -71,9 +71,9 @@ struct ThroughputRow {
     n_robots: usize,
     format: Scanned,
     copied: Copied,
-    /// Bytes a second of one thread in memory, read and written.
+    /// Bytes per second that one thread copies in memory.
     memory: f64,
-    /// Robots that the median run found and trusts.
+    /// Number of trusted robots of the median run.
     n_trusted: usize,
     /// All runs; the one of median time first.
     runs: Vec<Watched>,
@@ -240,7 +240,7 @@ impl ThroughputRow {
         &self.runs[0]
     }
 
-    /// End to end, over a copy of the same file.
+    /// Time of the whole run divided by that of a copy of the same file.
     fn over_copy(&self) -> f64 {
         self.median().seconds / self.copied.seconds_for(self.n_bytes)
     }

@@ -1,4 +1,4 @@
-//! Sizes and times in; how time grows with the number of points, as SVG with logarithmic axes, out.
+//! Plot of run time against number of points, as SVG with logarithmic axes.
 
 use std::fmt::Write as _;
 

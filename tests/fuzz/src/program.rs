@@ -13,7 +13,7 @@ use stillpoint::check::trajectory::Trajectory;
 use stillpoint::detect::review::Review;
 use stillpoint::engine::Engine;
 use stillpoint::eval::fuzz_doors;
-use stillpoint::job::{Given, Means};
+use stillpoint::job::{FlagValues, Means};
 use stillpoint::result::history;
 use stillpoint::store::{Scatter, Store, TileSink};
 
@@ -133,7 +133,7 @@ pub fn manifest(data: &[u8]) {
 
 /// `--config`.
 pub fn settings(data: &[u8]) {
-    let given = Given { config: Some(file("config.toml", data)), ..Given::default() };
+    let given = FlagValues { config: Some(file("config.toml", data)), ..FlagValues::default() };
     match Means::of(&given) {
         Ok(means) => {
             assert!((1..=1024).contains(&means.n_threads), "threads");

@@ -68,7 +68,8 @@ fn put_program(seeds: &Seeds, scratch: &Path) {
     seeds.put("store", "seed", [&n[..], archive, &tiles[64..]].concat());
     seeds.put("plant", "seed", stillpoint::eval::fuzz_doors::plant_body());
     seeds.put_all("pieces", stillpoint::eval::fuzz_doors::pieces(&crate::robots::models()[0]));
-    let means = stillpoint::job::Means::of(&stillpoint::job::Given::default()).expect("defaults");
+    let means =
+        stillpoint::job::Means::of(&stillpoint::job::FlagValues::default()).expect("defaults");
     let all = means.settings.all().into_iter().map(|(key, value)| format!("{key} = {value}\n"));
     seeds.put("settings", "all", all.collect::<String>());
 }

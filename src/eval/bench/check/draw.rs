@@ -1,4 +1,4 @@
-//! A seed in; a cell with wires and pipes in its robots' ways, and paths of these robots, out.
+//! Random cells with wires and pipes in their robots' ways, and random paths of these robots.
 
 use super::truth::{TOUCH, Truth, between};
 use contract::Result;
@@ -8,44 +8,43 @@ use simulate::random::Random;
 use simulate::scene::{Anchor, Hose};
 use simulate::{Plant, Postures, Scene};
 
-/// Smallest and largest turn of a joint in a small move, radians; slides go a fifth of that in
-/// metres.
+/// Least and greatest turn of a joint in a small move, radians; sliding joints move a fifth of
+/// that, in metres.
 const SMALL: [f64; 2] = [0.03, 0.35];
-/// Paths of each kind for each robot; to thin things goes one for each of them.
+/// Number of paths of each kind for each robot; each thin object gets one path into it.
 const N_SMALL: usize = 8;
 const N_WRIST: usize = 8;
 const N_FAR: usize = 4;
 const N_HIT: usize = 3;
-/// Thin things in the way of each robot.
+/// Number of thin objects in the way of each robot.
 const N_THIN: usize = 2;
-/// Tries to draw a path that hits something, or a thin thing that does not touch a robot as it
-/// stands.
+/// Attempts to draw a path that hits something, or a thin object that touches no robot.
 const N_TRIES: usize = 12;
 /// Radii of wires and of pipes, metres.
 const WIRE: [f64; 2] = [0.002, 0.005];
 const PIPE: f64 = 0.010;
-/// Thin things keep so far from robots as they stand, metres: more than the margin of a check.
+/// Least distance of thin objects from scanned robots, metres: more than the margin of a check.
 const ASIDE: f64 = 0.08;
 /// Length of a wire that hangs level, metres.
 const LENGTH: [f64; 2] = [1.0, 2.5];
 
-/// What a path was drawn as.
+/// Kind of a random path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum PathKind {
-    /// A few joints turned by little.
+    /// A small move of a few joints.
     Small,
-    /// A few of the outer half of the joints turned by little: most of these are wholly seen.
+    /// A small move of a few joints of the outer half, mostly through seen space.
     Wrist,
-    /// To a posture of its own.
+    /// A move to a random posture.
     Far,
-    /// One of several that hits something.
+    /// The first of several random moves that hits something.
     Hit,
-    /// Into a wire or a pipe.
+    /// A move into a wire or a pipe.
     Thin,
 }
 
-/// From how a robot stands, joints going straight.
+/// Waypoints from the scanned posture on, straight in joint space.
 #[derive(Debug, Clone)]
 pub(super) struct DrawnPath {
     pub(super) drawn: PathKind,
@@ -124,8 +123,8 @@ fn places<'p>(points: &'p [[f32; 3]], pose: &'p Pose) -> impl Iterator<Item = Po
     points.iter().step_by(EACH).map(move |p| pose * Point::from(p.map(f64::from)))
 }
 
-/// A wire or a pipe through a place that a link goes through, away from all robots as they stand;
-/// and where that path ends.
+/// A wire or a pipe through a point that a link passes, away from all scanned robots; and the end
+/// of that path.
 fn thin(
     scene: &Scene,
     models: &[Model],

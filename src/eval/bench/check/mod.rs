@@ -1,5 +1,5 @@
-//! `bench check`: seeds in; cells scanned, run and then asked about paths of their robots, of which
-//! the meshes tell whether they collide; false alarms and misses, by reason, out.
+//! `bench check`: scans random cells, runs the main job and checks paths of their robots. Meshes
+//! tell whether a path collides; the table counts false alarms and misses by reason.
 
 mod draw;
 mod row;
@@ -27,20 +27,20 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use truth::{TOUCH, Truth};
 
-/// What is drawn.
+/// Request of the bench.
 #[derive(Debug, Clone)]
 pub struct CheckBench {
     /// Seed, library and folders.
     pub drawn: DrawnCases,
-    /// Cells.
+    /// Number of cells.
     pub n_cases: usize,
     /// Robots and scanners of each cell.
     pub size: PlantSize,
-    /// What is nearer to a robot is in its way, metres.
+    /// Margin of the check, metres.
     pub margin: f64,
 }
 
-/// Runs the cells; returns the table.
+/// Runs the cells and returns the table.
 ///
 /// # Errors
 /// A library that cannot be read, files that cannot be written.
@@ -70,7 +70,7 @@ pub fn checks(bench: &CheckBench, means: &Means, engine: &Engine) -> Result<Stri
     place.run(cases, case, all, engine)
 }
 
-/// What all cells share.
+/// Library, engine and request that all cells share.
 struct Bench<'a> {
     bench: &'a CheckBench,
     models: &'a [Model],
@@ -160,7 +160,7 @@ impl Bench<'_> {
             points: vec![from.to_vec(), path.to.clone()],
             times: Vec::new(),
         };
-        let report = place.look(&asked, self.engine)?;
+        let report = place.check_path(&asked, self.engine)?;
         let nearest = truth.along(from, &path.to, margin);
         let is = match nearest.gap {
             ..=TOUCH => True::Collides,
@@ -185,7 +185,7 @@ impl Bench<'_> {
     }
 }
 
-/// The number in the result of a robot of the scene: the one that stands nearest.
+/// Index in the result of the robot that stands nearest to a robot of the scene.
 fn nearest(result: &ResultFile, scene: &Scene, robot: usize) -> Result<usize> {
     let at = geometry::Vector::from(scene.robots[robot].xyz);
     let off = |i: &usize| (geometry::Vector::from(result.robots[*i].base_pose.xyz) - at).norm();
@@ -195,7 +195,7 @@ fn nearest(result: &ResultFile, scene: &Scene, robot: usize) -> Result<usize> {
         .ok_or_else(|| Error::bad_input("no robot stands in the result"))
 }
 
-/// What comes near, in words.
+/// The nearest obstacle, as text.
 fn contacts(report: &PathReport) -> Vec<String> {
     let words = |c: &clearance::Contact| {
         let as_found = if c.as_found { ", as found" } else { "" };

@@ -1,20 +1,20 @@
-//! What the scene and the check say of a path, and of all paths of a cell.
+//! Rows of the path bench: truth and outcome of each path, and counts of each cell.
 
 use super::draw::PathKind;
 use crate::eval::bench::cases::CaseRow;
 use serde::Serialize;
 
-/// What the scene says of a path.
+/// Truth of a path, from the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum True {
-    /// It keeps the margin, and scanners saw all of its space and the margin about it.
+    /// The path keeps the margin, and scanners saw its space with the margin.
     Free,
-    /// It keeps the margin.
+    /// The path keeps the margin.
     Unseen,
-    /// It comes nearer than the margin, and touches nothing.
+    /// The path comes nearer than the margin without a collision.
     Grazes,
-    /// It touches something.
+    /// The path collides.
     Collides,
 }
 
@@ -25,16 +25,16 @@ pub(super) struct PathRow {
     pub(super) model: String,
     pub(super) drawn: PathKind,
     pub(super) truth: True,
-    /// Metres, to what, and where on the way.
+    /// Least distance (metres), obstacle, and position on the path.
     pub(super) gap: f64,
     pub(super) nearest: String,
     pub(super) at: f64,
-    /// What the check said.
+    /// Outcome of the check.
     pub(super) outcome: String,
     pub(super) doubts: Vec<String>,
-    /// What comes near, the worst first.
+    /// Contacts, worst first.
     pub(super) contacts: Vec<String>,
-    /// Waypoints, to look at it again.
+    /// Waypoints, to repeat the check.
     pub(super) from: Vec<f64>,
     pub(super) to: Vec<f64>,
 }
@@ -45,7 +45,7 @@ pub(super) struct CheckRow {
     pub(super) seed: u64,
     pub(super) failed: Option<String>,
     pub(super) n_robots: usize,
-    /// Robots that were found as what they are.
+    /// Number of robots found with the right model.
     pub(super) n_checked: usize,
     pub(super) paths: Vec<PathRow>,
     /// Scanning, the main job, and checking with its truth, seconds.
@@ -53,13 +53,13 @@ pub(super) struct CheckRow {
 }
 
 impl PathRow {
-    /// It keeps the margin, and something is said to be in its way.
+    /// Whether the check reports an obstacle though the path keeps the margin.
     pub(super) fn is_wolf(&self) -> bool {
         matches!(self.truth, True::Free | True::Unseen)
             && matches!(&*self.outcome, "near" | "blocked")
     }
 
-    /// The reason that counts: the worst contact's kind, or the doubts.
+    /// The decisive reason: the kind of the worst contact, or the doubts.
     pub(super) fn why(&self) -> String {
         if matches!(&*self.outcome, "near" | "blocked") {
             let worst = self.contacts.first().map_or("a joint cannot get there", |c| c);

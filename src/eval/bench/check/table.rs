@@ -1,5 +1,4 @@
-//! Paths that were checked, with what is true of them, in; tables for people and a line a path for
-//! programs out.
+//! Tables of the path bench for people, and one line per path for programs.
 
 use super::super::sheet;
 use super::row::{CheckRow, PathRow, True};
@@ -11,7 +10,7 @@ use std::fmt::Write as _;
 const OUTCOMES: [PathOutcome; 4] =
     [PathOutcome::Free, PathOutcome::Unknown, PathOutcome::Near, PathOutcome::Blocked];
 
-/// What is true of a path, in words.
+/// Truth of a path, as text.
 fn words(of: True) -> &'static str {
     match of {
         True::Free => "keeps the margin, in seen space",

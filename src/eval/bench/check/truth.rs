@@ -1,6 +1,5 @@
-//! The bodies of a scene and one of its robots in; how far that robot keeps from all else along a
-//! path, and whether its scanners saw the space that it goes through, out: from meshes alone,
-//! without scans.
+//! True distances of a path, computed from meshes alone: how near a robot comes to other bodies,
+//! and whether scanners could see the space that it passes.
 
 use contract::{Result, SpaceGrid};
 use geometry::{Aabb, Point, Pose};
@@ -14,31 +13,30 @@ use simulate::{BodyShape, Scene, Shapes};
 use std::cell::Cell;
 use std::collections::BTreeMap;
 
-/// Distances are told up to this, metres: farther is far.
+/// Greatest distance that is computed, metres.
 pub(super) const FAR: f64 = 0.1;
-/// So much farther than what is nearest each part is asked, metres: it need not be asked again
-/// until it has moved by as much.
+/// Search radius beyond the nearest obstacle of each part, metres: the part need not be examined
+/// again until it has moved by as much.
 const AHEAD: f64 = 0.03;
-/// Sides of triangles of what stands within reach, metres, at most.
+/// Greatest side of triangles of obstacles within reach, metres.
 const SHORT: f32 = 0.2;
-/// Nearer than this bodies touch, metres: rounding of single precision in a hall.
+/// Distance below which bodies touch, metres: rounding of single precision in a hall.
 pub(super) const TOUCH: f64 = 5e-4;
-/// No point moves farther from one posture that is looked at to the next, metres, wherever
-/// something is near.
+/// Greatest motion of any point between two examined postures near an obstacle, metres.
 const STEP: f64 = 2e-3;
-/// Distance of the places that are asked whether they were seen, metres; finer than the eighths of
-/// voxels that the product tells space by.
+/// Spacing of positions that are examined for visibility, metres; finer than the eighths of voxels
+/// of known space.
 const SAMPLE: f64 = 0.02;
-/// A place counts as seen where one so far beside it is, metres: half an eighth of the voxels that
-/// the product tells space by.
+/// Distance within which a seen position makes another one seen, metres: half an eighth of a voxel
+/// of known space.
 const SEEN_BESIDE: f64 = 0.0125;
-/// Postures that are asked so are so far apart, metres.
+/// Motion between postures that are examined for visibility, metres.
 const SEEN_STEP: f64 = 0.02;
-/// Edge of the voxels that tell what the robot filled as it was scanned, metres, and the distance
-/// of the places that mark them.
+/// Edge of the voxels that mark the scanned robot's own volume, and spacing of the positions that
+/// mark them, metres.
 const OWN_EDGE: f64 = 0.02;
 const OWN_SAMPLE: f64 = 0.008;
-/// Farthest that the virtual scanners measure, metres.
+/// Range of the virtual scanners, metres.
 const RANGE: f64 = 80.0;
 
 /// A body that moves with a link, in its frame.
@@ -48,10 +46,10 @@ struct MeshPart {
     bounds: Aabb,
     /// Places on its surface, and outward normals.
     samples: Vec<(Point, geometry::Vector)>,
-    /// The triangle of what stands that was nearest last: near it in the next posture, too, which
-    /// saves most of the others.
+    /// The obstacle triangle that was nearest last: it is probably near in the next posture, too,
+    /// which saves most others.
     last: Cell<Option<u32>>,
-    /// How far it kept from all when that was asked last, at least, and where its bounds were.
+    /// Lower bound of its distance at the last examination, and its bounds then.
     kept: Cell<Option<(f64, [Point; 8])>>,
 }
 
@@ -74,7 +72,7 @@ pub(super) struct Truth<'a> {
 pub(super) struct Nearest {
     /// Metres; no more than [`FAR`].
     pub(super) gap: f64,
-    /// To what; nothing where it is far.
+    /// The obstacle, if one is within range.
     pub(super) name: String,
     /// Which part.
     pub(super) link: usize,
@@ -226,7 +224,7 @@ impl<'a> Truth<'a> {
         })
     }
 
-    /// Whether a beam goes through the place, or as near to it as voxels of space are told apart.
+    /// Whether a beam passes through the position, within the resolution of known space.
     fn is_known(&self, p: &Point) -> bool {
         let beside = |k: usize| {
             let mut q = *p;
@@ -269,8 +267,8 @@ impl<'a> Truth<'a> {
 }
 
 impl MeshPart {
-    /// How far it keeps from all with its bounds so, at least: no point of it went farther than
-    /// the corners of its bounds since that was asked.
+    /// Lower bound of its distance with these bounds: no point of it has moved farther than the
+    /// corners of its bounds.
     fn keeps(&self, corners: &[Point; 8]) -> f64 {
         let Some((kept, before)) = self.kept.get() else { return 0.0 };
         let ways = before.iter().zip(corners).map(|(a, b)| (b - a).norm());
@@ -302,7 +300,7 @@ impl MeshPart {
     }
 }
 
-/// What bodies fill: their surfaces, and what these enclose.
+/// Voxels of bodies: their surfaces and enclosed volumes.
 fn filled<'s>(shapes: impl Iterator<Item = &'s BodyShape>) -> (SpaceGrid, Vec<bool>) {
     let mut all = Vec::new();
     for t in shapes.flat_map(|s| &s.triangles) {
@@ -317,8 +315,8 @@ fn filled<'s>(shapes: impl Iterator<Item = &'s BodyShape>) -> (SpaceGrid, Vec<bo
     (grid, filled)
 }
 
-/// A triangle in pieces that are short where they are within reach: boxes about long ones that lie
-/// askew hold much that is far from them.
+/// Divides a triangle into pieces that are small within reach: bounding boxes of long oblique
+/// triangles contain much that is far from them.
 fn pieces([a, b, c]: [Vec3; 3], near: Vec3, within: f32, take: &mut impl FnMut([Vec3; 3])) {
     let (low, high) = (a.min(b).min(c), a.max(b).max(c));
     let off = (low - near).max(near - high).max(Vec3::ZERO).length();
