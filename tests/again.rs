@@ -119,7 +119,7 @@ fn two_runs_in_one_folder_refuse_by_name() {
     std::thread::sleep(Duration::from_millis(50));
     let second = command(dir.path(), "out", &[]).output().expect("starts");
     assert_eq!(second.status.code(), Some(1), "{}", said(&second));
-    assert!(said(&second).contains("another run is at work"), "{}", said(&second));
+    assert!(said(&second).contains("another run uses"), "{}", said(&second));
     assert!(first.wait().expect("ends").success());
 }
 

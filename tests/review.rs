@@ -60,7 +60,7 @@ fn a_posture_that_is_given_is_where_the_fit_begins_and_no_more() {
     }
     let far = result(dir, &given(0.6));
     assert!(
-        far["warnings"].to_string().contains("is not what the scans show"),
+        far["warnings"].to_string().contains("contradicts the scans"),
         "{}",
         far["warnings"]
     );
