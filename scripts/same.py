@@ -35,12 +35,14 @@ def jobs(flags):
     yield "demo-las", [demo / "scans/scans.las"], demo / "robots", demo / "scans/scanners.toml", None
     halls = work / "halls"
     if not halls.is_dir():
-        call([old, "bench", "plant", "--cases", flags.halls, "--seed", flags.seed, "--keep", "--out", halls, "--threads", "2"])
-    for scans in sorted(halls.rglob("scans.e57")):
-        yield f"hall-{scans.relative_to(halls).parts[0]}", [scans], demo / "robots", None, None
+        call([old, "bench", "plan", "--halls", flags.halls, "--seed", flags.seed, "--robots", demo / "robots", "--keep", "--out", halls, "--threads", "2"])
+    for scans in sorted([*halls.rglob("scans.e57"), *halls.rglob("scans.las")]):
+        hall = scans.relative_to(halls).parts[0]
+        scanners = scans.with_name("scanners.toml")
+        yield f"hall-{hall}", [scans], halls / hall / "robots", scanners if scans.suffix == ".las" else None, None
     pairs = work / "rescans"
     if not pairs.is_dir():
-        call([old, "bench", "rescan", "--cases", 2, "--seed", flags.seed, "--keep", "--out", pairs, "--threads", "2"])
+        call([old, "bench", "rescan", "--cases", 2, "--n-robots", 3, "--scans", 4, "--step", 0.2, "--seed", flags.seed, "--keep", "--out", pairs, "--threads", "2"])
     for then in sorted(pairs.rglob("then*/scans.e57")):
         now = Path(str(then).replace("then", "now"))
         yield f"rescan-{then.relative_to(pairs).parts[0]}", [now], demo / "robots", None, [then]
@@ -79,11 +81,11 @@ def answer(program, job, out, threads):
     return (code, call([program, "rescan", "--base", first, *inputs, "--out", out, *common]))
 
 
-def files(out):
+def files(out, aside):
     """Files of a result that are compared, by name."""
     found = (p for p in sorted(out.rglob("*")) if p.is_file())
     named = {p.relative_to(out).as_posix(): p for p in found}
-    return {name: path for name, path in named.items() if not any(part in name for part in ASIDE)}
+    return {name: path for name, path in named.items() if not any(part in name for part in (*ASIDE, *aside))}
 
 
 def without_words(value):
@@ -101,9 +103,11 @@ def same(a, b):
     return without_words(json.loads(a.read_text())) == without_words(json.loads(b.read_text()))
 
 
-def compare(old, new):
+def compare(old, new, aside):
     """What differs between two results, and how many files were compared."""
-    a, b = files(old), files(new)
+    a, b = files(old, aside), files(new, aside)
+    if not a:
+        return ["no file of the old build to compare"], 0
     wrong = [f"only in one of them: {name}" for name in sorted(a.keys() ^ b.keys())]
     wrong += [name for name in sorted(a.keys() & b.keys()) if not same(a[name], b[name])]
     return wrong, len(a)
@@ -118,6 +122,7 @@ def main():
     parser.add_argument("--halls", type=int, default=3)
     parser.add_argument("--seed", type=int, default=60)
     parser.add_argument("--only", help="jobs whose names begin so")
+    parser.add_argument("--aside", nargs="*", default=[], help="files that are meant to differ, by a part of their names")
     flags = parser.parse_args()
     n_wrong = 0
     for job in jobs(flags):
@@ -133,7 +138,7 @@ def main():
             new = flags.work / "new" / job[0]
             new.parent.mkdir(parents=True, exist_ok=True)
             again = json.loads(json.dumps(answer(flags.new, job, new, threads)))
-            wrong, n = compare(old, new)
+            wrong, n = compare(old, new, flags.aside)
             if again != code:
                 wrong.append(f"exit {code} before, {again} now")
             n_wrong += len(wrong)
