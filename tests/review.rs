@@ -59,11 +59,7 @@ fn a_posture_that_is_given_is_where_the_fit_begins_and_no_more() {
         assert!((a - b).abs() < NEAR.max(3.0 * sigma), "{name}: {a} and {b} ± {sigma}");
     }
     let far = result(dir, &given(0.6));
-    assert!(
-        far["warnings"].to_string().contains("contradicts the scans"),
-        "{}",
-        far["warnings"]
-    );
+    assert!(far["warnings"].to_string().contains("contradicts the scans"), "{}", far["warnings"]);
     assert_eq!(joints(&far["robots"][0]), joints(found));
     let none = result(dir, &format!("[[robot]]\nat = {at}\nverdict = \"reject\"\n"));
     assert_eq!(none["robots"].as_array().expect("robots").len(), 0);

@@ -224,7 +224,7 @@ mod tests {
             told(vec![reject(9.0), reject(5.1), reject(0.1)], &[trusted("a", 0.0), doubtful]);
         let expected = [
             (
-                "reject near (9.00, 0.00, 0.00): nothing was found there, so it changed nothing",
+                "reject near (9.00, 0.00, 0.00): no robot was found there, so the entry has no effect",
                 true,
             ),
             (
@@ -233,7 +233,7 @@ mod tests {
             ),
             (
                 "reject near (0.10, 0.00, 0.00): a (trusted, score 0.93) is not reported; its points are labelled as fixed; \
-                 the program trusted it: look whether this is meant",
+                 without the review it would be trusted: check whether this is intended",
                 true,
             ),
         ];
