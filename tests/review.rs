@@ -66,7 +66,7 @@ fn a_posture_that_is_given_is_where_the_fit_begins_and_no_more() {
     // It was a true robot: that is said, not passed over.
     let did = none["review"][0]["did"].as_str().expect("a sentence");
     assert!(
-        did.contains("(trusted, score ") && did.contains("look whether this is meant"),
+        did.contains("(trusted, score ") && did.contains("check whether this is intended"),
         "{did}"
     );
     assert!(none["warnings"].to_string().contains("review, entry 1: reject near "), "{none:#}");
