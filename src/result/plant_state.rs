@@ -197,7 +197,7 @@ mod tests {
             let mut state = whole.clone();
             wrong(&mut state);
             let error = read_back(&state).expect_err("refused").to_string();
-            assert!(error.contains("contradict"), "{i}: {error}");
+            assert!(error.contains("numbered inconsistently"), "{i}: {error}");
         }
         // A key must be the plain name of a folder in the store.
         let foreign = written(&vec!["../../elsewhere".to_owned()]).expect("is written");

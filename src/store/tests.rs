@@ -267,7 +267,7 @@ fn a_store_that_is_cut_short_under_a_run_is_named_and_the_program_lives() {
         assert_eq!(error.kind(), Kind::BadInput);
         let text = error.to_string();
         assert!(
-            text.starts_with(&path.display().to_string()) && text.contains("cut short"),
+            text.starts_with(&path.display().to_string()) && text.contains("truncated"),
             "{text}"
         );
     };

@@ -105,7 +105,7 @@ fn broken_sheets_are_named() {
         ("urdf = 'other.urdf'", "missing"),
         ("urdf = '../../other.urdf'", "missing"),
         ("[main_chain]\ntip = 'x'", "no such link \"x\""),
-        ("[main_chain]\nroot = 'l2'\ntip = 'l1'", "does not hang"),
+        ("[main_chain]\nroot = 'l2'\ntip = 'l1'", "is not connected"),
         ("[effector]\nlinks = ['x']", "no such link \"x\""),
         ("[[link]]\nname = 'x'", "no such link"),
         ("[[link]]\nname = 'l1'\nsymmetry = { axis = [0, 0, 0] }", "no axis"),
