@@ -375,9 +375,9 @@ fn types(code: &str) -> impl Iterator<Item = &str> {
 }
 
 #[test]
-fn a_type_name_stands_once_in_the_stages() {
+fn a_type_name_stands_once_in_the_workspace() {
     let mut homes: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for (name, text) in rust_files("stages") {
+    for (name, text) in rust_files("stages").into_iter().chain(rust_files("src")) {
         for of in types(&code(&name, &text)).filter(|of| !SHARED_NAMES.contains(of)) {
             homes.entry(of.to_owned()).or_default().push(name.clone());
         }

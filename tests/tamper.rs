@@ -13,7 +13,7 @@ use stillpoint::check;
 use stillpoint::engine::Engine;
 use stillpoint::job::{FlagValues, Job, Means};
 use stillpoint::rescan::{Cell, Frame, RescanRequest, rescan};
-use stillpoint::result::conversion::{Format, convert};
+use stillpoint::result::conversion::{ExportFormat, convert};
 use stillpoint::result::history;
 use stillpoint::{cache, plan};
 
@@ -156,7 +156,7 @@ impl Plant {
     }
 
     /// Bytes that `export` writes.
-    fn export(&self, format: Format) -> Came<Vec<Vec<u8>>> {
+    fn export(&self, format: ExportFormat) -> Came<Vec<Vec<u8>>> {
         let written = convert(&self.at("out"), format, &Engine::new(2));
         let written = came(written)?;
         Ok(written.iter().map(|path| std::fs::read(path).expect("a file")).collect())
@@ -249,7 +249,7 @@ fn a_changed_byte_is_named_by_who_reads_it_and_changes_no_answer() {
     let kinds: BTreeSet<String> = all.keys().map(|name| family(name)).collect();
     assert!(kinds.len() > 20 && sampled.len() >= kinds.len() - 1, "{kinds:#?}");
     let (path, points) =
-        (plant.check().expect("checks"), plant.export(Format::Ply).expect("is written"));
+        (plant.check().expect("checks"), plant.export(ExportFormat::Ply).expect("is written"));
     let again = plant.rescan("again").expect("the rescan ends well");
     assert_eq!(plant.verify("again"), Ok(Vec::new()));
     let (mut read, mut unread) = ([0; 3], Vec::new());
@@ -267,7 +267,8 @@ fn a_changed_byte_is_named_by_who_reads_it_and_changes_no_answer() {
             }
         }
         read[0] += usize::from(told_or_same(&plant.check(), &path, name, "check"));
-        read[1] += usize::from(told_or_same(&plant.export(Format::Ply), &points, name, "export"));
+        read[1] +=
+            usize::from(told_or_same(&plant.export(ExportFormat::Ply), &points, name, "export"));
         if RESCAN_READS.iter().any(|own| family(name).starts_with(own)) {
             // What lies in the base's store is read only where there is no other store.
             let came = match name.starts_with("store/") {
@@ -317,7 +318,7 @@ fn missing_files_are_bad_input(plant: &Plant, all: &BTreeMap<String, Vec<u8>>) {
         }
         let errors = [
             plant.check().expect_err("a tile is missing"),
-            plant.export(Format::Ply).expect_err("a tile is missing"),
+            plant.export(ExportFormat::Ply).expect_err("a tile is missing"),
             plant.rescan_again("other").expect_err("a tile is missing"),
         ];
         for (kind, text) in errors {

@@ -7,7 +7,7 @@ use crate::check::PathDoubt;
 use crate::engine::Engine;
 use crate::engine::progress::{Mode, Progress};
 use crate::job::{FlagValues, Means};
-use crate::result::conversion::Format;
+use crate::result::conversion::ExportFormat;
 use clap::{Args, Parser, Subcommand};
 use contract::Result;
 use std::path::PathBuf;
@@ -161,7 +161,7 @@ pub(super) struct ExportFlags {
     /// Format; files are written to OUT/export, and a later run into OUT removes them if the points
     /// have changed, and reports it
     #[arg(long, value_name = "FORMAT", value_enum)]
-    pub(super) to: Format,
+    pub(super) to: ExportFormat,
 }
 
 #[derive(Debug, Args)]

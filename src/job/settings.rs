@@ -3,7 +3,7 @@
 //! stages.
 
 use super::method::Method;
-use super::value::{Value, assign};
+use super::value::{SettingValue, assign};
 use contract::{Error, Kind, Result};
 
 /// Declares the settings that can be set, stage by stage.

@@ -5,7 +5,7 @@ use contract::{Error, Kind, Result};
 use toml::Value as Toml;
 
 /// A type that a setting can have.
-pub(super) trait Value: Sized {
+pub(super) trait SettingValue: Sized {
     /// Name of the type, for messages.
     fn kind() -> String;
     /// Converts from TOML; `None` where the value has another type.
@@ -16,7 +16,7 @@ pub(super) trait Value: Sized {
 
 macro_rules! whole {
     ($($kind:ty),*) => {$(
-        impl Value for $kind {
+        impl SettingValue for $kind {
             fn kind() -> String {
                 "a whole number".into()
             }
@@ -31,7 +31,7 @@ macro_rules! whole {
 }
 whole!(u8, u16, u32, u64, usize, i16, i32, i64);
 
-impl Value for f64 {
+impl SettingValue for f64 {
     fn kind() -> String {
         "a number".into()
     }
@@ -44,7 +44,7 @@ impl Value for f64 {
     }
 }
 
-impl Value for f32 {
+impl SettingValue for f32 {
     fn kind() -> String {
         f64::kind()
     }
@@ -58,7 +58,7 @@ impl Value for f32 {
     }
 }
 
-impl Value for Method {
+impl SettingValue for Method {
     fn kind() -> String {
         "\"beam\" or \"paper\"".into()
     }
@@ -74,7 +74,7 @@ impl Value for Method {
     }
 }
 
-impl Value for bool {
+impl SettingValue for bool {
     fn kind() -> String {
         "true or false".into()
     }
@@ -86,7 +86,7 @@ impl Value for bool {
     }
 }
 
-impl Value for String {
+impl SettingValue for String {
     fn kind() -> String {
         "a word".into()
     }
@@ -98,7 +98,7 @@ impl Value for String {
     }
 }
 
-impl<T: Value, const N: usize> Value for [T; N] {
+impl<T: SettingValue, const N: usize> SettingValue for [T; N] {
     fn kind() -> String {
         format!("a list of {N}, each {}", T::kind())
     }
@@ -112,7 +112,7 @@ impl<T: Value, const N: usize> Value for [T; N] {
 }
 
 /// Optional settings without a value are absent from the record of a run.
-impl<T: Value> Value for Option<T> {
+impl<T: SettingValue> SettingValue for Option<T> {
     fn kind() -> String {
         T::kind()
     }
@@ -126,7 +126,7 @@ impl<T: Value> Value for Option<T> {
 }
 
 /// Assigns a TOML value to a setting.
-pub(super) fn assign<T: Value>(to: &mut T, key: &str, value: &Toml) -> Result<()> {
+pub(super) fn assign<T: SettingValue>(to: &mut T, key: &str, value: &Toml) -> Result<()> {
     *to = T::read(value).ok_or_else(|| {
         let given = value.as_str().map_or_else(|| value.to_string(), Into::into);
         Error::new(Kind::Usage, format!("{key} is {}, got \"{given}\"", T::kind()))

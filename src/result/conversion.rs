@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Formats that points can be converted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
+pub enum ExportFormat {
     /// One LAZ file of all points, as an octree that viewers load piece by piece (Potree, QGIS)
     Copc,
     /// Two PLY files: moving points and fixed points (Open3D, MeshLab)
@@ -24,7 +24,7 @@ pub enum Format {
 /// # Errors
 /// There is no result, it has no tiles, another run uses the folder, or files cannot be read or
 /// written.
-pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBuf>> {
+pub fn convert(out: &Path, format: ExportFormat, engine: &Engine) -> Result<Vec<PathBuf>> {
     let files = VerifiedFiles::open(out)?;
     // No run can use a result that was copied without its store.
     let _lock = out.join("store").is_dir().then(|| Job::hold(out)).transpose()?;
@@ -34,7 +34,7 @@ pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBu
     let listed = listed.filter(|path| path.starts_with("tiles/")).collect();
     let tiles = engine.fan_out("compare", listed, |name: &str| files.compared(name))?;
     let written = match format {
-        Format::Copc => {
+        ExportFormat::Copc => {
             let to = into.join(copc_name());
             let written = copc::write(&tiles, &to, &into.join("scratch"), engine);
             let damaged = |e: Error| match e.kind() {
@@ -45,7 +45,7 @@ pub fn convert(out: &Path, format: Format, engine: &Engine) -> Result<Vec<PathBu
             };
             written.map_err(damaged)?.then(|| vec![to])
         }
-        Format::Ply => {
+        ExportFormat::Ply => {
             let stage = engine.progress.stage("ply", Amount::items(0));
             let points = write_ply(&tiles, &into, || engine.cancel.check())?;
             points.iter().for_each(|n| stage.add(0, n.iter().sum(), 0));

@@ -3,7 +3,7 @@
 
 use super::catalogue::TileEntry;
 use super::record::Record;
-use super::spill::Segment;
+use super::spill::SpilledSegment;
 use contract::TileAt;
 
 /// Most points of one tile; this bounds the memory of a worker. A ground square of a dense cloud,
@@ -17,7 +17,7 @@ pub(super) struct Buffer {
     /// Records in memory.
     pub(super) records: Vec<Record>,
     /// Segments in the spill file.
-    pub(super) segments: Vec<Segment>,
+    pub(super) segments: Vec<SpilledSegment>,
     /// Tiles already written to the tile file.
     pub(super) written: Vec<TileEntry>,
     pub(super) is_written: bool,

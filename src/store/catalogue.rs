@@ -78,7 +78,7 @@ struct TileRow {
 
 /// Content of the archive.
 #[derive(Archive, Serialize, Deserialize)]
-struct Rows {
+struct TileRows {
     /// Length of the tile file, bytes.
     n_tile_bytes: u64,
     rows: Vec<TileRow>,
@@ -110,7 +110,7 @@ pub(super) fn write(
         range: e.range,
         bounds: [e.bounds.min, e.bounds.max],
     });
-    let rows = Rows { n_tile_bytes, rows: rows.collect() };
+    let rows = TileRows { n_tile_bytes, rows: rows.collect() };
     let archive = rkyv::to_bytes::<rkyv::rancor::Error>(&rows).map_err(|e| {
         Error::new(contract::Kind::Bug, "the catalogue cannot be archived").because(e)
     })?;
@@ -178,7 +178,7 @@ fn parse(bytes: &[u8]) -> Result<(Vec<TileEntry>, u64)> {
     }
     let mut aligned = rkyv::util::AlignedVec::<64>::with_capacity(archive.len());
     aligned.extend_from_slice(archive);
-    let rows = rkyv::from_bytes::<Rows, rkyv::rancor::Error>(&aligned)
+    let rows = rkyv::from_bytes::<TileRows, rkyv::rancor::Error>(&aligned)
         .map_err(|e| broken("the catalogue is damaged").because(e))?;
     let mut entries: Vec<TileEntry> = Vec::with_capacity(rows.rows.len());
     for row in &rows.rows {

@@ -6,7 +6,7 @@ use super::buffer::{Buffer, TILE_POINTS};
 use super::encode::decode;
 use super::file::Early;
 use super::record::{N_LEVELS, Record, TilePart};
-use super::spill::{Segment, Spill};
+use super::spill::{Spill, SpilledSegment};
 use contract::{Result, TileAt};
 
 /// Largest difference between places of one tile: places are stored as 32-bit differences from the
@@ -32,7 +32,7 @@ pub(super) struct Parts {
 struct Current {
     at: TileAt,
     /// Segments still to be read.
-    segments: std::vec::IntoIter<Segment>,
+    segments: std::vec::IntoIter<SpilledSegment>,
     /// Records that were in memory; they follow all segments.
     last: Vec<Record>,
     /// Records that were read but not returned yet.

@@ -13,13 +13,13 @@ pub struct Scatter {
 /// The points of one strip, grouped by tile.
 pub struct Scattered {
     pub(super) scan: ScanId,
-    pub(super) runs: Vec<TileRun>,
+    pub(super) runs: Vec<ScatteredRun>,
     pub(super) records: Vec<Record>,
 }
 
 /// Consecutive records of one tile.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TileRun {
+pub(super) struct ScatteredRun {
     /// Row and column of the tile.
     pub(super) tile: [u32; 2],
     /// Number of records.
@@ -62,7 +62,7 @@ impl Map for Scatter {
 impl Weigh for Scattered {
     fn weight_bytes(&self) -> usize {
         size_of::<Self>()
-            + self.runs.len() * size_of::<TileRun>()
+            + self.runs.len() * size_of::<ScatteredRun>()
             + self.records.len() * Record::BYTES
     }
 
@@ -116,8 +116,8 @@ fn ground_pixels(points: &[[f32; 3]], pixels: &mut [Pixel; BLOCK]) {
 fn records(
     strip: &Strip,
     find: impl Fn(&[[f32; 3]], &mut [Pixel; BLOCK]),
-) -> (Vec<TileRun>, Vec<Record>) {
-    let mut runs: Vec<TileRun> = Vec::new();
+) -> (Vec<ScatteredRun>, Vec<Record>) {
+    let mut runs: Vec<ScatteredRun> = Vec::new();
     let mut last = [u32::MAX; 2];
     let mut start = 0;
     let mut records: Vec<Record> = Vec::with_capacity(strip.len());
@@ -129,7 +129,7 @@ fn records(
             if tile != last {
                 let n = records.len() + at - start;
                 if n > 0 {
-                    runs.push(TileRun { tile: last, n });
+                    runs.push(ScatteredRun { tile: last, n });
                 }
                 (last, start) = (tile, records.len() + at);
             }
@@ -140,13 +140,13 @@ fn records(
         }));
     }
     if records.len() > start {
-        runs.push(TileRun { tile: last, n: records.len() - start });
+        runs.push(ScatteredRun { tile: last, n: records.len() - start });
     }
     (runs, records)
 }
 
 /// Merges runs of the same tile and keeps the order of their records.
-fn grouped(runs: &[TileRun], records: &[Record]) -> (Vec<TileRun>, Vec<Record>) {
+fn grouped(runs: &[ScatteredRun], records: &[Record]) -> (Vec<ScatteredRun>, Vec<Record>) {
     let mut order: Vec<([u32; 2], usize, usize)> = Vec::with_capacity(runs.len());
     let mut start = 0;
     for run in runs {
@@ -154,13 +154,13 @@ fn grouped(runs: &[TileRun], records: &[Record]) -> (Vec<TileRun>, Vec<Record>) 
         start += run.n;
     }
     order.sort_unstable();
-    let mut joined: Vec<TileRun> = Vec::new();
+    let mut joined: Vec<ScatteredRun> = Vec::new();
     let mut out = Vec::with_capacity(records.len());
     for (tile, start, n) in order {
         out.extend_from_slice(&records[start..start + n]);
         match joined.last_mut() {
             Some(run) if run.tile == tile => run.n += n,
-            _ => joined.push(TileRun { tile, n }),
+            _ => joined.push(ScatteredRun { tile, n }),
         }
     }
     (joined, out)

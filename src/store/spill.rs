@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Offset and number of consecutive records in the spill file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Segment {
+pub(super) struct SpilledSegment {
     offset: u64,
     n: usize,
 }
@@ -35,18 +35,22 @@ impl Spill {
         self.len
     }
 
-    pub(super) fn write(&mut self, records: &[Record]) -> Result<Segment> {
+    pub(super) fn write(&mut self, records: &[Record]) -> Result<SpilledSegment> {
         let bytes: &[u8] = bytemuck::cast_slice(records);
         self.file
             .write_all(bytes)
             .map_err(|e| Error::of_file("the spill file cannot be written", &self.dir, e))?;
-        let segment = Segment { offset: self.len, n: records.len() };
+        let segment = SpilledSegment { offset: self.len, n: records.len() };
         self.len += bytes.len() as u64;
         Ok(segment)
     }
 
     /// Reads a segment and appends it to `records`. After the first read no more may be written.
-    pub(super) fn read(&mut self, segment: &Segment, records: &mut Vec<Record>) -> Result<()> {
+    pub(super) fn read(
+        &mut self,
+        segment: &SpilledSegment,
+        records: &mut Vec<Record>,
+    ) -> Result<()> {
         let start = records.len();
         records.resize(start + segment.n, Record::zeroed());
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut records[start..]);

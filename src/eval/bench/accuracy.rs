@@ -6,7 +6,7 @@
 //! poses goes in. Suites and their goals follow METHOD.md §19.
 
 use super::cell::{ScannedCell, Then};
-use super::condition::{DrawnCase, Suites, Way, cases};
+use super::condition::{DrawnCase, FitMethod, Suites, cases};
 use super::journal::Journal;
 use super::request::{DrawnCases, chosen};
 use super::score::{AccuracyRow, score};
@@ -106,15 +106,17 @@ fn run(
         let truth = (drawn.world_from_base, drawn.posture.clone());
         let starts = draw::starts(case, &drawn);
         let then = match case.condition.way {
-            Way::FromTruth => Then::Adjust(Some(&truth)),
-            Way::SequentialAdjusted => Then::Adjust(None),
+            FitMethod::FromTruth => Then::Adjust(Some(&truth)),
+            FitMethod::SequentialAdjusted => Then::Adjust(None),
             _ if !starts.is_empty() => Then::Converge(&starts),
             _ => Then::Nothing,
         };
         match case.condition.way {
-            Way::Sequential | Way::SequentialAdjusted => settings.method = Method::Paper,
-            Way::ScansHeld => settings.fit.scan_sigma[..2].fill(HELD),
-            Way::Whole | Way::FromTruth => {}
+            FitMethod::Sequential | FitMethod::SequentialAdjusted => {
+                settings.method = Method::Paper
+            }
+            FitMethod::ScansHeld => settings.fit.scan_sigma[..2].fill(HELD),
+            FitMethod::Whole | FitMethod::FromTruth => {}
         }
         settings.fit.calibrate |= case.condition.calibrate;
         let search = |library: &PreparedLibrary<'_>| {

@@ -22,7 +22,7 @@ pub(super) enum Mounting {
 
 /// Method with which a case is solved: that of the product, or a baseline for comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum FitMethod {
     /// The method of the product.
     Whole,
     /// The link-by-link sweep of the paper.
@@ -82,7 +82,7 @@ pub(super) struct Condition {
     /// Whether a wall, a ceiling or a large leaning plate is behind that plate.
     pub(super) backed: bool,
     /// Method with which the case is solved.
-    pub(super) way: Way,
+    pub(super) way: FitMethod,
     /// If not 0, only the refinement runs, from starts with errors of all joints up to this,
     /// degrees.
     pub(super) perturbed_deg: f64,
@@ -113,7 +113,7 @@ pub(super) const PLAIN: Condition = Condition {
     mount: Mounting::Floor,
     rim: 0.0,
     backed: false,
-    way: Way::Whole,
+    way: FitMethod::Whole,
     perturbed_deg: 0.0,
 };
 /// Perturbations of the basin's curve, degrees (METHOD.md §20).
@@ -145,7 +145,7 @@ pub(super) struct DrawnCase {
 impl DrawnCase {
     /// Whether it belongs to a baseline, whose figures are not those of the product.
     pub(super) fn is_baseline(&self) -> bool {
-        self.condition.way != Way::Whole
+        self.condition.way != FitMethod::Whole
     }
 
     /// Number of the robot's errors, equal for all cases of one robot.
@@ -163,7 +163,7 @@ type AccuracySuite = (&'static str, usize, fn(usize) -> Condition);
 /// All suites, in the order of METHOD.md §19.
 const SUITES: &[AccuracySuite] = &[
     ("paper", 3, |_| Condition { n_beams: 5e7, noise: 0.0, ..PLAIN }),
-    ("source", 3, |_| Condition { n_beams: 5e7, noise: 0.0, way: Way::Sequential, ..PLAIN }),
+    ("source", 3, |_| Condition { n_beams: 5e7, noise: 0.0, way: FitMethod::Sequential, ..PLAIN }),
     ("models", 3, |_| PLAIN),
     ("noise-1", 3, |_| Condition { n_beams: 5e7, noise: 0.001, ..PLAIN }),
     ("noise-2", 3, |_| Condition { n_beams: 5e7, ..PLAIN }),
@@ -171,10 +171,10 @@ const SUITES: &[AccuracySuite] = &[
     ("noise-10", 3, |_| Condition { n_beams: 5e7, noise: 0.010, ..PLAIN }),
     ("registration", 6, |_| REGISTERED),
     // The cells of `registration` again, solved by the baselines.
-    ("sequential", 3, |_| Condition { way: Way::Sequential, ..REGISTERED }),
-    ("sequential-adjusted", 3, |_| Condition { way: Way::SequentialAdjusted, ..REGISTERED }),
-    ("scans-held", 3, |_| Condition { way: Way::ScansHeld, ..REGISTERED }),
-    ("from-truth", 3, |_| Condition { way: Way::FromTruth, ..REGISTERED }),
+    ("sequential", 3, |_| Condition { way: FitMethod::Sequential, ..REGISTERED }),
+    ("sequential-adjusted", 3, |_| Condition { way: FitMethod::SequentialAdjusted, ..REGISTERED }),
+    ("scans-held", 3, |_| Condition { way: FitMethod::ScansHeld, ..REGISTERED }),
+    ("from-truth", 3, |_| Condition { way: FitMethod::FromTruth, ..REGISTERED }),
     // Beams as in `noise-2`, since its errors are stated as multiples of those.
     ("mixed", 3, |_| Condition { n_beams: 5e7, mixed: true, ..PLAIN }),
     ("few", 9, |k| Condition { n_scanners: 3 - k % 3, ..PLAIN }),

@@ -1,6 +1,6 @@
 //! Random cells with wires and pipes in their robots' ways, and random paths of these robots.
 
-use super::truth::{TOUCH, Truth, between};
+use super::truth::{PathTruth, TOUCH, between};
 use contract::Result;
 use geometry::{Point, Pose, Vector};
 use robot::Model;
@@ -185,7 +185,7 @@ fn target(robot: &SceneRobot<'_>, random: &mut Random) -> Result<Vec<f64>> {
 /// Paths of a robot, beside those into thin things.
 pub(super) fn paths(
     robot: &SceneRobot<'_>,
-    truth: &Truth<'_>,
+    truth: &PathTruth<'_>,
     random: &mut Random,
 ) -> Result<Vec<DrawnPath>> {
     let (model, from) = (robot.model, &robot.posture[..]);

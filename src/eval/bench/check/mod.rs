@@ -25,7 +25,7 @@ use simulate::random::Random;
 use simulate::{Plant, Scene, Shapes};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use truth::{TOUCH, Truth};
+use truth::{PathTruth, TOUCH};
 
 /// Request of the bench.
 #[derive(Debug, Clone)]
@@ -125,7 +125,7 @@ impl Bench<'_> {
         seed: u64,
     ) -> Result<Vec<PathRow>> {
         let &SceneRobot { scene, number, model, .. } = robot;
-        let truth = Truth::new(scene, shapes, number, model, &robot.posture)?;
+        let truth = PathTruth::new(scene, shapes, number, model, &robot.posture)?;
         let mut random = Random::keyed(&[seed, number as u64, 0x9A7]);
         paths.extend(draw::paths(robot, &truth, &mut random)?);
         let request = CheckRequest {
@@ -150,7 +150,7 @@ impl Bench<'_> {
         place: &RobotSite<'_>,
         robot: &SceneRobot<'_>,
         path: &DrawnPath,
-        truth: &Truth<'_>,
+        truth: &PathTruth<'_>,
     ) -> Result<PathRow> {
         let (model, from) = (robot.model, &robot.posture[..]);
         self.engine.cancel.check()?;

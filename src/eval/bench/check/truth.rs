@@ -54,7 +54,7 @@ struct MeshPart {
 }
 
 /// A robot of a scene among all else.
-pub(super) struct Truth<'a> {
+pub(super) struct PathTruth<'a> {
     model: &'a Model,
     world_from_base: Pose,
     parts: Vec<MeshPart>,
@@ -80,7 +80,7 @@ pub(super) struct Nearest {
     pub(super) at: f64,
 }
 
-impl<'a> Truth<'a> {
+impl<'a> PathTruth<'a> {
     /// Of the robot of this index, as it stands in the scene.
     pub(super) fn new(
         scene: &Scene,
