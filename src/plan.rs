@@ -78,14 +78,12 @@ impl Run<'_> {
         let opened = self.open(&models_kept)?;
         let (sources, scans) = (&opened.sources, &opened.sources.scans);
 
-        // First pass: every point is read once, from files into lattice tiles, unless the tiles
-        // exist already.
+        // First pass: reads every point once into lattice tiles, unless the tiles exist already.
         let input_tiles = InputTiles::new(sources, &job.means, output.tiles(), engine);
         let (tiles, store) = input_tiles.of_all(&sources.inputs, digests)?;
         let store = spatial_tiles::checked(store, scans, &settings.export, engine)?;
 
-        // From the tiles: local planes and occupied space, joined over tiles and scans. After that
-        // nothing is as large as the cloud.
+        // Local planes and occupied space; nothing after this is as large as the cloud.
         let ground_kept = Cache::new(output.fits(), digests.ground_key(&tiles, settings));
         let ground = || Ground::of_tiles(scans, &store, settings, engine);
         let ground = ground_kept.get_or_compute("ground", ground)?;
@@ -93,8 +91,7 @@ impl Run<'_> {
         let clusters = cluster::split(space, floor, &settings.cluster);
         let regions = base_search::regions(&clusters, &settings.region);
 
-        // One task for each region and model finds base poses and postures; then those that are
-        // compatible are chosen.
+        // Base poses and postures for each region and model; then compatible fits are chosen.
         let of_plant = || Cache::new(output.fits(), digests.fits_key(&tiles, settings));
         let (fits_kept, pieces_kept) = (of_plant(), of_plant());
         let library = PreparedLibrary::new(&opened.library.models);

@@ -309,7 +309,7 @@ impl<'a> Labelling<'a> {
         export::write_robot(out, &id, fit, model, hanging)?;
         let space = space.map(|space| write_space(out, &id, space)).transpose()?;
         let names = [format!("pictures/{id}.png"), format!("pictures/{id}_evidence.png")];
-        let title = format!("{id} {} {}", fit.model_name, fit.label_verdict().word());
+        let title = format!("{id} {} {}", fit.model_name, fit.verdict.word());
         picture.draw(&title).write(&out.join(&names[0]))?;
         export::draw_evidence(&title, picture, fit, model).write(&out.join(&names[1]))?;
         Ok((space, names))

@@ -273,12 +273,6 @@ impl Fit {
     /// Whether points are labelled by this fit.
     #[must_use]
     pub fn gives_labels(&self) -> bool {
-        self.label_verdict() != Verdict::Refused
-    }
-
-    /// The verdict as the labels have it: refused where the fit gives none.
-    #[must_use]
-    pub fn label_verdict(&self) -> Verdict {
-        if self.is_without_labels { Verdict::Refused } else { self.verdict }
+        !self.is_without_labels && self.verdict != Verdict::Refused
     }
 }

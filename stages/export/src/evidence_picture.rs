@@ -41,7 +41,7 @@ pub fn draw_evidence(title: &str, picture: &RobotPicture, fit: &Fit, model: &Mod
     let top = 36 + SIDE + 40;
     let height = top + LINE * (n_rows + 3 + words.len() as i64) + 10;
     let mut canvas = Canvas::new(WIDTH as usize, height as usize);
-    canvas.text(8, 10, Title, verdict_color(fit.label_verdict()), title);
+    canvas.text(8, 10, Title, verdict_color(fit.verdict), title);
     for (i, view) in picture.residuals().iter().enumerate() {
         canvas.paste(i as i64 * (SIDE + 6), 36, view);
     }
@@ -141,7 +141,7 @@ fn scale(canvas: &mut Canvas, y: i64) {
 fn words(fit: &Fit) -> Vec<(i64, String)> {
     let mut all = vec![format!(
         "{}: score {:.3}, rms {:.2} mm",
-        fit.label_verdict().word(),
+        fit.verdict.word(),
         fit.score,
         1e3 * fit.rms
     )];

@@ -137,7 +137,7 @@ fn yaml(fit: &Fit, model: &Model) -> String {
     let (p, q) = (pose.translation.vector, pose.rotation);
     let mut text = format!(
         "# {}: metres and radians\nbase:\n  link: {}\n  xyz: [{:.6}, {:.6}, {:.6}]\n  quat_wxyz: [{:.9}, {:.9}, {:.9}, {:.9}]\njoints:\n",
-        fit.label_verdict().word(),
+        fit.verdict.word(),
         quote::yaml(&model.links[0].name),
         p.x,
         p.y,
