@@ -109,7 +109,7 @@ fn a_place_and_a_model_are_enough_where_the_run_finds_nothing_to_search() {
     let place = format!("[[robot]]\nat = {at}\nmodel = {}\n", found["model"]);
     let same = |hinted: &[Value]| {
         assert_eq!(hinted.len(), 1, "{hinted:?}");
-        assert_eq!(hinted[0]["verdict"], "trusted");
+        assert_eq!(hinted[0]["verdict"], "trusted", "{:#}", hinted[0]);
         for ((name, a), (_, b)) in joints(&found).iter().zip(joints(&hinted[0])) {
             let sigma = found["sigma"][name].as_f64().expect("a deviation");
             assert!((a - b).abs() < NEAR.max(4.0 * sigma), "{name}: {a} and {b} ± {sigma}");

@@ -40,8 +40,8 @@ struct Sorting<'a> {
     link_from_base: Vec<Pose>,
     /// For each link, whether joints move it.
     moves: &'a [bool],
-    /// By LAS `point_source_id`: shadows of robots as seen from the scanners that may have measured
-    /// its points.
+    /// By LAS `point_source_id`: shadows of robots as seen from the scanners that may have
+    /// measured its points.
     shadows: BTreeMap<u16, Vec<&'a Shadow>>,
     /// By LAS `point_source_id`, where it belongs to one scanner: that scanner.
     eyes: BTreeMap<u16, ScannerAt>,

@@ -55,8 +55,8 @@ pub(super) struct SuiteFlags {
     /// Names of suites (default: all)
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub(super) suite: Vec<String>,
-    /// Number of cases of each suite, and of each model in suites with one case per model (default:
-    /// the suite's own number)
+    /// Number of cases of each suite, and of each model in suites with one case per model
+    /// (default: the suite's own number)
     #[arg(long, value_name = "N")]
     pub(super) cases: Option<usize>,
     #[command(flatten)]

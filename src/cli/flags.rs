@@ -158,8 +158,8 @@ pub(super) struct ExportFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
-    /// Format; files are written to OUT/export, and a later run into OUT removes them if the points
-    /// have changed, and reports it
+    /// Format; files are written to OUT/export, and a later run into OUT removes them if the
+    /// points have changed, and reports it
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: ExportFormat,
 }

@@ -13,8 +13,8 @@
 //!
 //! An entry with a model and without joints starts a search around its place where no robot of the
 //! model is trusted there, also where the run found no region to search. The yaw and the height of
-//! the base are open. So they are for an entry with joints and without `rpy`, where the posture does
-//! not stand on a base that was found.
+//! the base are open. So they are for an entry with joints and without `rpy`, where the posture
+//! does not stand on a base that was found.
 //!
 //! The user keeps the file and passes it to every run, so that its statements survive reruns.
 

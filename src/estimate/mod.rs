@@ -64,8 +64,8 @@ pub struct Estimate {
     pub store_bytes: u64,
     /// Disk space for the result, bytes. An old result stays until the new one is complete.
     pub output_bytes: u64,
-    /// Estimated number of spatial tiles, from samples of the scans, and the limit: a run with more
-    /// ends before it writes any.
+    /// Estimated number of spatial tiles, from samples of the scans, and the limit: a run with
+    /// more ends before it writes any.
     pub tiles: [u64; 2],
     /// Free space on the disk of the output folder, bytes; 0 where the system does not state it.
     pub free_bytes: u64,

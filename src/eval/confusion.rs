@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 /// Counts of points by true and assigned label.
 #[derive(Debug, Clone, Default)]
 pub struct Confusion {
-    /// Moving points labelled as moving, moving points labelled otherwise, other points labelled as
-    /// moving, and the rest.
+    /// Moving points labelled as moving, moving points labelled otherwise, other points labelled
+    /// as moving, and the rest.
     pub moving: [u64; 4],
     /// Of links: with the right robot and link, all that are true links, all that are said to be
     /// links.

@@ -22,8 +22,8 @@ pub(crate) struct PlantState {
     pub(crate) scans: Vec<Scan>,
     /// Key of the tiles of each input: the name of their folder in the store.
     pub(crate) tiles: Vec<Key>,
-    /// For each input, the pose that carried its scans to the plant's frame, where its files are in
-    /// another one.
+    /// For each input, the pose that carried its scans to the plant's frame, where its files are
+    /// in another one.
     pub(crate) frames: Vec<Option<Pose>>,
     /// Digest of the content of each of these stores (see `Store::contents`).
     pub(crate) contents: Vec<String>,

@@ -2,7 +2,8 @@
 //! base is not known is looked for with the yaw and the height of the base open.
 
 use super::{Decision, Review, ReviewPlace, by_rank};
-use crate::detect::search::{RobotHint, Search};
+use crate::detect::search::Search;
+use crate::detect::search::hint::RobotHint;
 use crate::engine::{Engine, Task};
 use contract::{Fit, Result, Verdict};
 use geometry::Point;

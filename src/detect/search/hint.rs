@@ -5,7 +5,7 @@ use super::tried::TriedBases;
 use super::{GUESS_BREADTH, SAME_BASE, Search, base, breadth, feet};
 use crate::engine::AllThreads;
 use base_search::RegionEvidence;
-use contract::{Candidate, Fit, InstallationPlane, JointFit, Region, Result, View};
+use contract::{Candidate, Fit, InstallationPlane, JointFit, Region, Result, Verdict};
 use fit::MeasuredScene;
 use geometry::{Aabb, NearestField, Point, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
@@ -50,12 +50,26 @@ impl Search<'_, '_> {
         }
         let planes = self.planes(&region);
         let scene = MeasuredScene::new(&region, &views, &planes, &self.settings.fit, &AllThreads);
-        let candidates = self.hinted_candidates(hint, &scene, &views, &planes);
-        let mut fits = match &hint.posture {
-            None => self.fits(&scene, &candidates, &mut TriedBases::default())?,
-            Some(posture) => self.turned(hint, posture, &scene, &candidates),
-        };
-        fits.retain(|fit| (base(&fit.world_from_base) - hint.at).norm() <= hint.radius);
+        let feet = feet(&region, &hint.at, hint.radius);
+        let sight = RegionEvidence::new(&feet, &views, &scene.evidence, &scene.scouts, &AllThreads);
+        let heights = hint.at.z - hint.radius..hint.at.z + hint.radius;
+        let mounts = self.mounts(&region);
+        let guessed = base_search::level_planes(&feet.world_bounds(), heights);
+        let (mut fits, mut tried) = (Vec::new(), TriedBases::default());
+        // Heights without a plane are searched where no plane has the robot.
+        for (planes, breadth) in
+            [(&planes, breadth(&planes)), (&mounts, 1), (&guessed, GUESS_BREADTH)]
+        {
+            let candidates = self.hinted_candidates(hint, &sight, planes, breadth);
+            fits.extend(match &hint.posture {
+                None => self.fits(&scene, &candidates, &mut tried)?,
+                Some(posture) => self.turned(hint, posture, &scene, &candidates),
+            });
+            fits.retain(|fit| (base(&fit.world_from_base) - hint.at).norm() <= hint.radius);
+            if fits.iter().any(|fit| fit.verdict == Verdict::Trusted) {
+                break;
+            }
+        }
         Ok(fits)
     }
 
@@ -72,28 +86,18 @@ impl Search<'_, '_> {
         Region { origin, bounds: Aabb { min, max } }
     }
 
-    /// Bases within the radius on floors and stands, on guessed heights and on walls and ceilings;
-    /// the best of each place, best first.
+    /// Bases on some planes within the radius, the best of each place, best first.
     fn hinted_candidates(
         &self,
         hint: &RobotHint,
-        scene: &MeasuredScene<'_>,
-        views: &[View],
+        sight: &RegionEvidence<'_>,
         planes: &[InstallationPlane],
+        breadth: usize,
     ) -> Vec<Candidate> {
-        let feet = feet(scene.region, &hint.at, hint.radius);
-        let sight = RegionEvidence::new(&feet, views, &scene.evidence, &scene.scouts, &AllThreads);
-        let heights = hint.at.z - hint.radius..hint.at.z + hint.radius;
-        let guessed = base_search::level_planes(&feet.world_bounds(), heights);
-        let mounts = self.mounts(scene.region);
-        let mut found = Vec::new();
-        for (planes, breadth) in
-            [(planes, breadth(planes)), (&guessed[..], GUESS_BREADTH), (&mounts[..], 1)]
-        {
-            if !planes.is_empty() {
-                found.extend(self.candidates_of(hint.model, &sight, planes, 0.0, breadth));
-            }
+        if planes.is_empty() {
+            return Vec::new();
         }
+        let mut found = self.candidates_of(hint.model, sight, planes, 0.0, breadth);
         found.retain(|c| {
             let pose = c.bases.first();
             pose.is_some_and(|pose| (base(&pose.0) - hint.at).norm() <= hint.radius)

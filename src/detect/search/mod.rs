@@ -2,7 +2,7 @@
 //! the library through base search and fit.
 
 mod fallback;
-mod hint;
+pub(crate) mod hint;
 mod tried;
 mod views;
 
@@ -17,7 +17,6 @@ use base_search::{BaseSearch, RegionEvidence};
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
 use fit::{MeasuredScene, Prepared, ScansOfRegion};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
-pub(crate) use hint::RobotHint;
 use rayon::prelude::*;
 use robot::Model;
 use serde::Serialize;

@@ -65,7 +65,8 @@ pub(super) struct Condition {
     pub(super) other_branch: bool,
     /// Whether the places of joints are estimated, too.
     pub(super) calibrate: bool,
-    /// Probability of each kind of clutter: fence, conveyor, cabinet and post, hoses along the arm.
+    /// Probability of each kind of clutter: fence, conveyor, cabinet and post, hoses along the
+    /// arm.
     pub(super) clutter: f64,
     /// Probability of each item that a robot may carry besides: a gripper with a part, a dress
     /// pack, a rag.

@@ -10,8 +10,8 @@ pub(crate) struct Graph {
     /// Neighbours of voxel `i` are `to[starts[i]..starts[i + 1]]`, ascending.
     starts: Vec<usize>,
     to: Vec<u32>,
-    /// Length of the edge to each neighbour in `to`, in hundredths of a voxel's edge. Integers make
-    /// sums exact and ties the same on every machine.
+    /// Length of the edge to each neighbour in `to`, in hundredths of a voxel's edge. Integers
+    /// make sums exact and ties the same on every machine.
     steps: Vec<u32>,
 }
 

@@ -28,8 +28,8 @@ const NOTHING: u8 = 255;
 /// The evidence at one place.
 #[derive(Debug, Clone, Copy)]
 struct EvidenceCell {
-    /// Distance beyond the place at which the farthest beam ended, in units; 0 if none ended beyond
-    /// it.
+    /// Distance beyond the place at which the farthest beam ended, in units; 0 if none ended
+    /// beyond it.
     beyond: u8,
     /// Distance along a beam to the nearest end of one, in units.
     distance: u8,

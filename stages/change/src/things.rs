@@ -95,7 +95,8 @@ struct ChangePiece {
     cells: Vec<OccupancyCell>,
     n_points: u64,
     bounds: Aabb,
-    /// Bounds with sparse voxels around it, where beams graze the thing or hit something beside it.
+    /// Bounds with sparse voxels around it, where beams graze the thing or hit something beside
+    /// it.
     wide: Aabb,
     /// Bounds of the whole connected thing, if a large share of it changed. A thing pushed by less
     /// than its length stands partly where it stood before.

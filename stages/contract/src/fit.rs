@@ -263,8 +263,8 @@ pub struct Fit {
     pub verdict: Verdict,
     /// Reasons for the verdict, in words; empty only for a trusted fit without remarks.
     pub reasons: Vec<String>,
-    /// Whether the fit gives no labels although it is not refused, because a later step of the same
-    /// run explains its points better. Not part of any file.
+    /// Whether the fit gives no labels although it is not refused, because a later step of the
+    /// same run explains its points better. Not part of any file.
     #[serde(skip)]
     pub is_without_labels: bool,
 }

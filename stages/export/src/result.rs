@@ -93,8 +93,8 @@ pub struct RobotEntry {
     /// with a wrist that no beam reached.
     #[serde(default)]
     pub equals: Vec<EqualEntry>,
-    /// For each joint other values within its limits, whole turns away, at which the posture is the
-    /// same.
+    /// For each joint other values within its limits, whole turns away, at which the posture is
+    /// the same.
     #[serde(default)]
     pub equivalents: NamedMap<Vec<f64>>,
     /// The tool that it carries; the tool's joints and links follow the robot's own.

@@ -28,7 +28,8 @@ const CONTRADICTED: ContradictedLink =
 
 /// How a base is turned to where it explains as much.
 struct TurnedBase {
-    /// Yaws that are tried: every 2°. In that arc the base's corners move by half of the tolerance.
+    /// Yaws that are tried: every 2°. In that arc the base's corners move by half of the
+    /// tolerance.
     n_yaws: usize,
     /// Share of the search's tolerance with which they are scored: where the base stands is known.
     tolerance: f64,

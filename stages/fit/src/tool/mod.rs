@@ -20,8 +20,8 @@ use crate::{MeasuredScene, Prepared, Settings};
 
 /// What the beams must say of a tool that is there.
 struct ToolJudgement {
-    /// Least score of its links: tools that are there have 0.69 and more, others that are taken for
-    /// them up to 0.67.
+    /// Least score of its links: tools that are there have 0.69 and more, others that are taken
+    /// for them up to 0.67.
     min_score: f64,
     /// Least share of its surface that must have been judged: of tools that are there it was 0.4
     /// and more.
