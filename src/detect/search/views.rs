@@ -40,7 +40,7 @@ impl Search<'_, '_> {
     }
 
     /// The `skip` of tiles that leaves about [`ENOUGH_POINTS`] points of a region (see
-    /// [`Tile::skip`]).
+    /// [`skip`](contract::Tile::skip)).
     fn thin(&self, region: &Region) -> u32 {
         let touching = self.store.touching(&region.world_bounds());
         let n_points: u64 = touching.iter().map(|&i| self.store.entries()[i].n_points).sum();
