@@ -278,16 +278,15 @@ fn strays(
     near: &[Option<(f32, usize)>],
     is_on_robot: impl Fn(&Obstacle) -> bool,
 ) -> Vec<bool> {
-    let is_point = |o: &Obstacle| matches!(o.what, ObstacleKind::Fixed | ObstacleKind::Uncertain);
     let mut out: Vec<bool> = (around.all.iter().zip(near))
-        .map(|(o, near)| near.is_some() && is_point(o) && is_on_robot(o))
+        .map(|(o, near)| near.is_some() && o.is_point() && is_on_robot(o))
         .collect();
     if around.split.is_empty() {
         return out;
     }
-    let points: Vec<Obstacle> = around.all.iter().filter(|o| is_point(o)).copied().collect();
+    let points: Vec<Obstacle> = around.all.iter().filter(|o| o.is_point()).copied().collect();
     let others: Vec<usize> =
-        (0..out.len()).filter(|&at| is_point(&around.all[at]) && !out[at]).collect();
+        (0..out.len()).filter(|&at| around.all[at].is_point() && !out[at]).collect();
     let all: Vec<Obstacle> = others.iter().map(|&at| around.all[at]).collect();
     let is_evident =
         supported_by_others(&all, surface_threshold(&points), |k| near[others[k]].is_some());

@@ -53,17 +53,15 @@ pub(crate) fn evident(
 ) -> Vec<bool> {
     let mut out = vec![true; all.len()];
     let Some(space) = space else { return out };
-    // Floors and other robots are not known from single points only.
-    let is_point = |o: &Obstacle| matches!(o.what, ObstacleKind::Fixed | ObstacleKind::Uncertain);
     let cubes = Cubes::of(all);
     let thin: Vec<bool> = (all.iter())
-        .map(|o| is_point(o) && !o.is_grazed && cubes.n_near(o, NEAR, SOLID) < SOLID)
+        .map(|o| o.is_point() && !o.is_grazed && cubes.n_near(o, NEAR, SOLID) < SOLID)
         .collect();
     let surface_threshold = cubes.surface_threshold();
     let is_behind = behind(all, &thin);
     all.iter_mut().zip(is_behind).for_each(|(o, is_behind)| o.is_grazed |= is_behind);
     let cubes = Cubes::of(all);
-    for (at, o) in all.iter().enumerate().filter(|(_, o)| is_point(o)) {
+    for (at, o) in all.iter().enumerate().filter(|(_, o)| o.is_point()) {
         out[at] = cubes.n_near(o, NEAR, surface_threshold) >= surface_threshold
             || !o.is_grazed
                 && (cubes.is_small_object(at) || !is_seen(space, &(world_from_base * place(o))));

@@ -36,6 +36,13 @@ pub(crate) struct Obstacle {
     pub(crate) is_grazed: bool,
 }
 
+impl Obstacle {
+    /// Whether it is a cell of single points. Floors and robots are known from more than these.
+    pub(crate) fn is_point(&self) -> bool {
+        matches!(self.what, ObstacleKind::Fixed | ObstacleKind::Uncertain)
+    }
+}
+
 #[inline]
 pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>().sqrt()
