@@ -66,11 +66,40 @@ impl Search<'_, '_> {
                 Some(posture) => self.turned(hint, posture, &scene, &candidates),
             });
             fits.retain(|fit| (base(&fit.world_from_base) - hint.at).norm() <= hint.radius);
+            for fit in fits.iter_mut().filter(|fit| fit.verdict != Verdict::Refused) {
+                self.look_closer(fit)?;
+            }
             if fits.iter().any(|fit| fit.verdict == Verdict::Trusted) {
                 break;
             }
         }
         Ok(fits)
+    }
+
+    /// Fits a robot again among the points about it alone, as robots of regions are: what it can
+    /// reach is so large that depth images of it are coarse, and its points thinned.
+    fn look_closer(&self, fit: &mut Fit) -> Result<()> {
+        let model = &self.library.models[fit.model];
+        let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
+        let mut body = Aabb::EMPTY;
+        for (link, pose) in model.links.iter().zip(model.poses(&posture)) {
+            if !link.bounds.is_empty() {
+                let world_from_link = fit.world_from_base * pose;
+                let corners = link.bounds.corners().map(|c| world_from_link * Point::from(c));
+                corners.iter().for_each(|corner| body.add(corner.coords.into()));
+            }
+        }
+        let origin = base(&fit.world_from_base).map(f64::round);
+        let local = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
+        let world = body.grown(MARGIN);
+        let bounds = Aabb { min: local(world.min), max: local(world.max) };
+        let closer = self.in_scene(&Region { origin, bounds }, |scene, settings| {
+            fit::again(fit, self.library.prepared(fit.model), scene, settings, &AllThreads)
+        })?;
+        if let Some(closer) = closer {
+            *fit = closer;
+        }
+        Ok(())
     }
 
     /// Everything that the robot can reach from around the place.
