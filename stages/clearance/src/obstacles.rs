@@ -167,7 +167,8 @@ impl Obstacles {
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
         let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);
-        let is_evident = evident(&mut all, behind, space, &known.world_from_base);
+        let eyes: Vec<Point> = cells.fronts.values().map(Front::eye).collect();
+        let is_evident = evident(&mut all, behind, &eyes, space, &known.world_from_base);
         let mut evident = is_evident.into_iter();
         all.retain(|_| evident.next().unwrap_or(true));
         for (number, model, poses) in others {
