@@ -31,11 +31,10 @@ const MIN_CLOSE: usize = 3;
 const LINE_REACH: f32 = 0.15;
 /// Thickness of a line, metres: the wire, the scanner's noise, and the edge of a cell.
 const LINE_THICKNESS: f32 = 0.010;
-/// Number of other points that make a line, and their least share of all points about that belong
-/// to no surface: in a cloud of thirty strays every second one has three others in line by chance.
+/// Number of other points that make a line.
 const ON_LINE: usize = 3;
-const LINE_SHARE: f64 = 0.34;
-/// The same for points of grazing beams: a curtain behind an edge has points all over.
+/// Number of other points that make a line of points of grazing beams, and their least share of all
+/// points about: a curtain behind an edge has points all over.
 const ON_CLEAR_LINE: usize = 8;
 const CLEAR_SHARE: f64 = 0.7;
 /// Number of points, the farthest ones, through which such a line is tried.
@@ -53,8 +52,6 @@ type Offset = nalgebra::Vector3<f32>;
 /// Obstacles by the cube of edge [`NEAR`] that holds them.
 struct Cubes<'a> {
     all: &'a [Obstacle],
-    /// Whether each belongs to a surface; empty as long as that is not known.
-    is_on_surface: Vec<bool>,
     cubes: FxHashMap<[i32; 3], Vec<u32>>,
 }
 
@@ -78,10 +75,9 @@ pub(crate) fn evident(
     let surface_threshold = cubes.surface_threshold();
     let is_behind = behind(all, &thin);
     all.iter_mut().zip(is_behind).for_each(|(o, is_behind)| o.is_grazed |= is_behind);
-    let cubes = Cubes::of(all).with_surfaces(surface_threshold);
-    let points = Cubes { is_on_surface: cubes.is_on_surface.clone(), ..Cubes::of_points(all) };
+    let (cubes, points) = (Cubes::of(all), Cubes::of_points(all));
     for (at, o) in all.iter().enumerate().filter(|(_, o)| o.is_point()) {
-        out[at] = cubes.is_on_surface[at]
+        out[at] = cubes.n_near(o, NEAR, surface_threshold) >= surface_threshold
             || if o.is_grazed {
                 points.is_on_clear_line(at, eyes)
             } else {
@@ -119,9 +115,11 @@ pub(crate) fn supported_by_others(
     surface_threshold: usize,
     is_needed: impl Fn(usize) -> bool,
 ) -> Vec<bool> {
-    let cubes = Cubes::of(all).with_surfaces(surface_threshold);
+    let cubes = Cubes::of(all);
     let is_evident = |(at, o): (usize, &Obstacle)| {
-        is_needed(at) && (cubes.is_on_surface[at] || !o.is_grazed && cubes.is_small_object(at))
+        is_needed(at)
+            && (cubes.n_near(o, NEAR, surface_threshold) >= surface_threshold
+                || !o.is_grazed && cubes.is_small_object(at))
     };
     all.iter().enumerate().map(is_evident).collect()
 }
@@ -142,14 +140,7 @@ impl<'a> Cubes<'a> {
         for (at, o) in all.iter().enumerate().filter(|(_, o)| counts(o)) {
             cubes.entry(cube(o.at)).or_default().push(at as u32);
         }
-        Self { all, is_on_surface: Vec::new(), cubes }
-    }
-
-    /// The same, with which obstacles have as many neighbours as a surface.
-    fn with_surfaces(mut self, threshold: usize) -> Self {
-        let is_on = |o: &Obstacle| self.n_near(o, NEAR, threshold) >= threshold;
-        self.is_on_surface = self.all.iter().map(is_on).collect();
-        self
+        Self { all, cubes }
     }
 
     /// Obstacles in the cubes about a place, up to `n` cubes away along each axis.
@@ -194,11 +185,10 @@ impl<'a> Cubes<'a> {
     /// Whether enough other obstacles lie on a line through an obstacle.
     fn is_on_line(&self, at: usize) -> bool {
         let near = self.offsets(at);
-        let least = ((near.len() as f64 * LINE_SHARE).ceil() as usize).max(ON_LINE);
         // Points that are too near define no direction.
         near.iter()
             .filter(|v| v.norm() > 2.0 * LINE_THICKNESS)
-            .any(|v| n_along(&near, &v.normalize()) >= least)
+            .any(|v| n_along(&near, &v.normalize()) >= ON_LINE)
     }
 
     /// Whether most of the obstacles about an obstacle lie on one line through it that does not
@@ -221,12 +211,12 @@ impl<'a> Cubes<'a> {
             .any(|unit| n_along(&near, &unit) >= most.max(ON_CLEAR_LINE) && is_across(&unit))
     }
 
-    /// From an obstacle to all others within [`LINE_REACH`] that belong to no surface, metres.
+    /// From an obstacle to all others within [`LINE_REACH`], metres.
     fn offsets(&self, at: usize) -> Vec<Offset> {
         let here = self.all[at].at;
         let reach = (LINE_REACH / NEAR).ceil() as i32;
         self.around(here, reach)
-            .filter(|i| *i as usize != at && !self.is_on_surface[*i as usize])
+            .filter(|i| *i as usize != at)
             .map(|i| Offset::from(std::array::from_fn(|k| self.all[i as usize].at[k] - here[k])))
             .filter(|v| v.norm() < LINE_REACH)
             .collect()
@@ -309,25 +299,6 @@ mod tests {
         let wire: Vec<[f32; 3]> =
             (0..9).map(|i| [noise(i), noise(i + 1), 0.04 * i as f32 - 0.16]).collect();
         assert_eq!(evident_among(&wire, SpaceKind::Free), [true; 9]);
-    }
-
-    #[test]
-    fn strays_that_line_up_by_chance_are_evidence_of_nothing() {
-        // Forty of them scattered over a ball of 15 cm.
-        let mut random = 7_u32;
-        let mut next = || {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (random >> 8) as f32 / (1 << 24) as f32 * 0.22 - 0.11
-        };
-        let strays: Vec<[f32; 3]> = (0..40).map(|_| [next(), next(), next()]).collect();
-        let n = evident_among(&strays, SpaceKind::Free).iter().filter(|is| **is).count();
-        assert!(n <= 4, "{n} of 40");
-        // A wire among half as many strays, a hand's width before the wall, stays.
-        let wire = (0..15).map(|i| [0.9, 0.25, 0.02 * i as f32 + 0.1]);
-        let all: Vec<[f32; 3]> = wire
-            .chain(strays[..8].iter().map(|p| [p[0] + 0.8, p[1] + 0.25, p[2] + 0.25]))
-            .collect();
-        assert_eq!(evident_among(&all, SpaceKind::Free)[..15], [true; 15]);
     }
 
     #[test]
