@@ -91,8 +91,8 @@ fn a_posture_that_is_given_is_where_the_fit_begins_and_no_more() {
 fn a_place_and_a_model_are_enough_where_the_run_finds_nothing_to_search() {
     let dir = tempfile::tempdir().expect("a folder");
     let dir = dir.path();
-    // So many beams that the flange's turn is clear: it is coarse with a quarter of them, and then a
-    // few samples decide on the verdict.
+    // So many beams that the flange's turn is clear: it is coarse with a quarter of them, and a few
+    // samples decide on the verdict then.
     palletiser(dir, 12, 4 * N_BEAMS);
     let found = result(dir, "")["robots"][0].clone();
     let base: Vec<f64> =

@@ -11,9 +11,9 @@ mod scan;
 mod stream;
 mod strips;
 
-use crate::Settings;
 use crate::oddities::Oddities;
 use crate::reader::{FileReading, MaskSeed, RawStrips, Reader, SampledPoint, ScanSeed, Want};
+use crate::settings::Settings;
 use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
 use contract::{Error, Format, Kind, Result, XmlLimits, check_xml};

@@ -9,9 +9,9 @@ mod strips;
 #[cfg(test)]
 mod tests;
 
-use crate::Settings;
 use crate::oddities::Oddities;
 use crate::reader::{FileReading, MaskSeed, Reader, SampledPoint, ScanSeed, Want};
+use crate::settings::Settings;
 use crate::units::{Choice, Units};
 use contract::{Format, Result};
 use file::PtxFile;

@@ -1,9 +1,9 @@
 //! An open E57 file: what its description states of its scans.
 
 use super::scan::E57Scan;
-use crate::Settings;
 use crate::oddities::Oddities;
 use crate::reader::{MaskSeed, ScanSeed};
+use crate::settings::Settings;
 use crate::units::Units;
 use std::path::PathBuf;
 

@@ -4,9 +4,9 @@ use super::file::E57File;
 use super::pages::Pages;
 use super::points::{E57Points, WantedFields};
 use super::scan::E57Scan;
-use crate::Settings;
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, SampledPoint, Want};
+use crate::settings::Settings;
 use contract::{Attributes, Result};
 use geometry::Point;
 

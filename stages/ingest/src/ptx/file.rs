@@ -1,10 +1,10 @@
 //! An open PTX file: what its blocks state, and where their points begin.
 
-use crate::Settings;
 use crate::frame::FileFrame;
 use crate::levels::Span;
 use crate::oddities::Oddities;
 use crate::reader::{MaskSeed, ScanSeed};
+use crate::settings::Settings;
 use crate::units::Units;
 use std::path::PathBuf;
 
