@@ -92,7 +92,7 @@ pub(crate) fn are_stacked(low: &Plane, high: &Plane, n: isize) -> bool {
     low.normal == high.normal && off.abs() < 0.1 * GUESS_STEP
 }
 
-/// Level planes of a box at a range of heights (world frame, metres), every [`GUESS_STEP`].
+/// Level planes of a box at a range of heights (world frame, metres), every 3 cm (`GUESS_STEP`).
 /// Their area is zero: no points support them, and the fit does not keep their height.
 #[must_use]
 pub fn level_planes(world: &Aabb, heights: Range<f64>) -> Vec<InstallationPlane> {
