@@ -3,6 +3,7 @@
 
 use super::tried::TriedBases;
 use super::{GUESS_BREADTH, SAME_BASE, Search, base, breadth, feet};
+use crate::detect::robots::{region, standing};
 use crate::engine::AllThreads;
 use base_search::RegionEvidence;
 use contract::{Candidate, Fit, InstallationPlane, JointFit, Region, Result, Verdict};
@@ -61,14 +62,15 @@ impl Search<'_, '_> {
             [(&planes, breadth(&planes)), (&mounts, 1), (&guessed, GUESS_BREADTH)]
         {
             let candidates = self.hinted_candidates(hint, &sight, planes, breadth);
-            fits.extend(match &hint.posture {
+            let mut found = match &hint.posture {
                 None => self.fits(&scene, &candidates, &mut tried)?,
                 Some(posture) => self.turned(hint, posture, &scene, &candidates),
-            });
-            fits.retain(|fit| (base(&fit.world_from_base) - hint.at).norm() <= hint.radius);
-            for fit in fits.iter_mut().filter(|fit| fit.verdict != Verdict::Refused) {
+            };
+            for fit in found.iter_mut().filter(|fit| fit.verdict != Verdict::Refused) {
                 self.look_closer(fit)?;
             }
+            found.retain(|fit| (base(&fit.world_from_base) - hint.at).norm() <= hint.radius);
+            fits.extend(found);
             if fits.iter().any(|fit| fit.verdict == Verdict::Trusted) {
                 break;
             }
@@ -79,21 +81,9 @@ impl Search<'_, '_> {
     /// Fits a robot again among the points about it alone, as robots of regions are: what it can
     /// reach is so large that depth images of it are coarse, and its points thinned.
     fn look_closer(&self, fit: &mut Fit) -> Result<()> {
-        let model = &self.library.models[fit.model];
-        let posture: Vec<f64> = fit.joints.iter().map(|joint| joint.value).collect();
-        let mut body = Aabb::EMPTY;
-        for (link, pose) in model.links.iter().zip(model.poses(&posture)) {
-            if !link.bounds.is_empty() {
-                let world_from_link = fit.world_from_base * pose;
-                let corners = link.bounds.corners().map(|c| world_from_link * Point::from(c));
-                corners.iter().for_each(|corner| body.add(corner.coords.into()));
-            }
-        }
-        let origin = base(&fit.world_from_base).map(f64::round);
-        let local = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
-        let world = body.grown(MARGIN);
-        let bounds = Aabb { min: local(world.min), max: local(world.max) };
-        let closer = self.in_scene(&Region { origin, bounds }, |scene, settings| {
+        let body = standing(fit, &self.library.models[fit.model]).grown(MARGIN);
+        let around = region(&base(&fit.world_from_base), &body);
+        let closer = self.in_scene(&around, |scene, settings| {
             fit::again(fit, self.library.prepared(fit.model), scene, settings, &AllThreads)
         })?;
         if let Some(closer) = closer {
@@ -105,14 +95,9 @@ impl Search<'_, '_> {
     /// Everything that the robot can reach from around the place.
     fn region_around(&self, hint: &RobotHint) -> Region {
         let reach = self.library.prepared(hint.model).reach() + hint.radius + MARGIN;
-        let origin = hint.at.map(f64::round);
         let all = self.bounds().grown(MARGIN);
-        let (mut min, mut max) = ([0.0; 3], [0.0; 3]);
-        for i in 0..3 {
-            min[i] = (hint.at[i] - reach).max(all.min[i]) - origin[i];
-            max[i] = (hint.at[i] + reach).min(all.max[i]) - origin[i];
-        }
-        Region { origin, bounds: Aabb { min, max } }
+        let about = Aabb { min: hint.at.into(), max: hint.at.into() };
+        region(&hint.at, &about.grown(reach).shared(&all))
     }
 
     /// Bases on some planes within the radius, the best of each place, best first.
