@@ -83,6 +83,8 @@ fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
     let said = if is_reached { " hits something (" } else { "The robot cannot go there: " };
     assert!(why.contains(said) && why.ends_with('.'), "{why}");
     assert_eq!(down["schema"], "stillpoint.check/2");
+    let apart = down["beam_spacing"].as_f64().expect("scanners have positions");
+    assert!((0.001..0.05).contains(&apart), "{apart}");
 
     // A turn keeps clear of the floor: what is left is not known, and may be allowed.
     let turn = head.clone() + &line(&found) + &line(&moved(0, 0.5));

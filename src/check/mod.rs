@@ -118,6 +118,7 @@ impl RobotSite<'_> {
         let contacts = contacts.all();
         let mut report = robot.report(request, path, &contacts, impossible);
         report.n_postures = walk.n_postures();
+        report.beam_spacing = walk.beam_spacing();
         report.ids.clone_from(&self.ids);
         if self.is_partial {
             let what = "parts of the run were left out: `stillpoint report` says which";

@@ -190,6 +190,7 @@ impl CheckedRobot<'_> {
             outcome,
             n_waypoints: path.points.len(),
             n_postures: 0,
+            beam_spacing: None,
             times: path.times.clone(),
             margin: request.margin,
             ids: Vec::new(),

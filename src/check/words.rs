@@ -185,7 +185,15 @@ impl PathReport {
         for doubt in self.doubts.iter().skip(1) {
             let _ = write!(text, "\nand {}", doubt.why());
         }
-        let _ = writeln!(text, "\nnot looked at: {NOT_CHECKED}");
+        let _ = write!(text, "\nnot looked at: {NOT_CHECKED}");
+        if let Some(apart) = self.beam_spacing {
+            let _ = write!(
+                text,
+                ", and what is thinner than {:.0} mm: so far apart are neighbouring beams on the way",
+                (apart * 1e3).ceil()
+            );
+        }
+        text.push('\n');
         text
     }
 
@@ -220,6 +228,7 @@ impl PathReport {
             "margin": self.margin,
             "n_waypoints": self.n_waypoints,
             "n_postures": self.n_postures,
+            "beam_spacing": self.beam_spacing,
             "impossible": self.impossible.iter().map(impossible).collect::<Vec<_>>(),
             "contacts": self.contacts.iter().map(contact).collect::<Vec<_>>(),
             "warnings": self.warnings,

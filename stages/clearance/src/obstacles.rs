@@ -37,6 +37,8 @@ pub struct Cells {
     cells: Vec<(u64, ObstacleKind, bool, u16)>,
     /// Nearest measurements of each scanner, whatever they belong to, by `point_source_id`.
     fronts: BTreeMap<u16, Front>,
+    /// These scanners.
+    eyes: Vec<ScannerAt>,
 }
 
 /// The part of space that beams passed through, in the world frame.
@@ -65,6 +67,8 @@ pub struct Obstacles {
     /// Distance from the base along each axis up to which points were collected, metres.
     far: f64,
     pub(crate) split: Split,
+    /// Scanners with known position.
+    eyes: Vec<ScannerAt>,
 }
 
 /// How a voxel of unseen space is divided into parts.
@@ -84,7 +88,7 @@ impl Cells {
     #[must_use]
     pub fn within(far: f64, eyes: &BTreeMap<u16, ScannerAt>) -> Self {
         let fronts = eyes.iter().map(|(source, eye)| (*source, Front::new(eye))).collect();
-        Self { far, cells: Vec::new(), fronts }
+        Self { far, cells: Vec::new(), fronts, eyes: eyes.values().copied().collect() }
     }
 
     /// Records that a scanner measured a point (base frame, at most `far` away), whatever it is.
@@ -140,16 +144,23 @@ impl Cells {
 }
 
 impl Cells {
-    /// For each obstacle, whether neighbouring beams hit something in front of it, according to all
-    /// scanners that measured it. It is only computed where `is_needed` holds, and `false`
-    /// elsewhere.
-    fn behind(&self, all: &[Obstacle], is_needed: impl Fn(usize) -> bool) -> Vec<bool> {
+    /// For each thin obstacle, whether its beam passed the edge of something in front of it,
+    /// according to all scanners that measured it: neighbouring beams hit something, or another
+    /// scanner measured something there. Of a wire in front of a surface a scanner may have
+    /// nothing but points in between. `false` for all others.
+    fn behind(&self, all: &[Obstacle], thin: &[bool]) -> Vec<bool> {
+        let place = |o: &Obstacle| Point::from(o.at.map(f64::from));
+        let mut fronts = self.fronts.clone();
+        for front in fronts.values_mut() {
+            let asked = all.iter().zip(thin).filter(|(_, thin)| **thin).map(|(o, _)| place(o));
+            front.add_beside(asked, all.iter().filter(|o| o.is_point()).map(place));
+        }
         let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
         let is_behind = |(at, alike): (usize, &[(u64, ObstacleKind, bool, u16)])| {
-            let p = Point::from(all[at].at.map(f64::from));
-            let by = |source: u16| self.fronts.get(&source).is_some_and(|f| f.is_behind(&p));
+            let p = place(&all[at]);
+            let by = |source: u16| fronts.get(&source).is_some_and(|f| f.is_behind(&p));
             // Beams that grazed a robot are no evidence.
-            is_needed(at) && alike.iter().filter(|cell| !cell.2).all(|cell| by(cell.3))
+            thin[at] && alike.iter().filter(|cell| !cell.2).all(|cell| by(cell.3))
         };
         alike.enumerate().map(is_behind).collect()
     }
@@ -166,8 +177,8 @@ impl Obstacles {
         known: KnownBounds,
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
-        let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);
-        let eyes: Vec<Point> = cells.fronts.values().map(Front::eye).collect();
+        let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, thin);
+        let eyes: Vec<Point> = cells.eyes.iter().map(|eye| eye.at).collect();
         let is_evident = evident(&mut all, behind, &eyes, space, &known.world_from_base);
         let mut evident = is_evident.into_iter();
         all.retain(|_| evident.next().unwrap_or(true));
@@ -180,7 +191,8 @@ impl Obstacles {
             all.extend(unseen(space, &base_from_world));
             split = Split::of(space.grid().edge, &base_from_world);
         }
-        let mut out = Self { all, bins: Vec::new(), known, far: cells.far, split };
+        let (bins, eyes) = (Vec::new(), cells.eyes.clone());
+        let mut out = Self { all, bins, known, far: cells.far, split, eyes };
         out.sort();
         out
     }
@@ -224,6 +236,12 @@ impl Obstacles {
     #[must_use]
     pub fn largest(&self) -> f64 {
         self.all.iter().map(|o| f64::from(o.radius)).fold(0.0, f64::max)
+    }
+
+    /// Distance between neighbouring beams of the scanner that resolves a place (base frame) best,
+    /// metres; `None` without scanners of known position.
+    pub(crate) fn beam_spacing(&self, p: &Point) -> Option<f64> {
+        self.eyes.iter().map(|eye| eye.step * (p - eye.at).norm()).min_by(f64::total_cmp)
     }
 
     /// Whether a box of a link extends beyond the volume in which points were collected, or beyond

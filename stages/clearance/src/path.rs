@@ -106,6 +106,22 @@ impl<'a> PathWalk<'a> {
         self.first[self.first.len() - 1] + 1
     }
 
+    /// Distance between neighbouring beams where moving parts are at the waypoints, and half-way
+    /// between them, metres: the largest, each by the scanner that resolves the place best. `None`
+    /// without scanners of known position. Thinner things may stand there without a single point.
+    #[must_use]
+    pub fn beam_spacing(&self) -> Option<f64> {
+        let halves = self.path.windows(2).map(|leg| between(&leg[0], &leg[1], 0.5));
+        let postures = self.path.iter().cloned().chain(halves);
+        let of_posture = |posture: Vec<f64>| {
+            let poses = self.body.model.poses(&posture);
+            let middles = self.body.bounds().map(|(link, b)| poses[link] * b.center());
+            let all = middles.filter_map(|p| self.around.beam_spacing(&p));
+            all.max_by(f64::total_cmp)
+        };
+        postures.filter_map(of_posture).max_by(f64::total_cmp)
+    }
+
     /// Number of pieces.
     #[must_use]
     pub fn n_pieces(&self) -> usize {

@@ -6,7 +6,7 @@
 
 use geometry::{Point, Pose};
 use robot::Model;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A beam may hit a surface that it passes at this distance or less, metres: the radius of a beam,
 /// and the errors of posture and model.
@@ -122,15 +122,24 @@ impl Front {
         Self { eye: eye.at, width: eye.step.max(BEAM), near: FxHashMap::default() }
     }
 
-    /// Place of the scanner, base frame, metres.
-    pub(crate) fn eye(&self) -> Point {
-        self.eye
-    }
-
     pub(crate) fn add(&mut self, p: &Point) {
         let (cell, far) = self.cell(p);
         let near = self.near.entry(cell).or_insert(far);
         *near = near.min(far);
+    }
+
+    /// Adds those of some points that lie in the directions of other points, or beside them.
+    pub(crate) fn add_beside(
+        &mut self,
+        asked: impl Iterator<Item = Point>,
+        points: impl Iterator<Item = Point>,
+    ) {
+        let asked: FxHashSet<[i32; 3]> = asked.flat_map(|p| beside(self.cell(&p).0)).collect();
+        for p in points {
+            if asked.contains(&self.cell(&p).0) {
+                self.add(&p);
+            }
+        }
     }
 
     /// Adds the measurements of another front of the same scanner.
@@ -150,10 +159,14 @@ impl Front {
 
     /// Whether the beam to a point, or a neighbouring one, hit something in front of it.
     pub(crate) fn is_behind(&self, p: &Point) -> bool {
-        let ([x, y, z], far) = self.cell(p);
-        let beside = |i: i32| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1];
-        (0..27).any(|i| self.near.get(&beside(i)).is_some_and(|near| near + MIN_DEPTH < far))
+        let (cell, far) = self.cell(p);
+        beside(cell).any(|cell| self.near.get(&cell).is_some_and(|near| near + MIN_DEPTH < far))
     }
+}
+
+/// A cell and its 26 neighbours.
+fn beside([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
+    (0..27).map(move |i: i32| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
 }
 
 #[cfg(test)]
@@ -202,5 +215,16 @@ mod tests {
         ] {
             assert_eq!(front.is_behind(&Point::from(p)), is_behind, "{p:?}");
         }
+    }
+
+    #[test]
+    fn a_wire_that_only_another_scanner_measured_has_points_behind_it() {
+        let mut front = Front::new(&ScannerAt { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
+        let wire = || (0..100).map(|i| Point::new(2.0, 0.0, 0.5 + 0.006 * f64::from(i)));
+        let (stray, beside) = (Point::new(2.1, 0.003, 0.8), Point::new(2.1, 0.05, 0.8));
+        front.add(&stray);
+        assert!(!front.is_behind(&stray));
+        front.add_beside([stray, beside].into_iter(), wire());
+        assert_eq!([stray, beside].map(|p| front.is_behind(&p)), [true, false]);
     }
 }
