@@ -1,12 +1,15 @@
 //! Random cells with wires and pipes in their robots' ways, and random paths of these robots.
 
+use super::bodies::places as on_triangle;
+use super::scene_robot::SceneRobot;
 use super::truth::{PathTruth, TOUCH, between};
 use contract::Result;
 use geometry::{Point, Pose, Vector};
+use glamx::Vec3;
 use robot::Model;
 use simulate::random::Random;
 use simulate::scene::{Anchor, Hose};
-use simulate::{Plant, Postures, Scene};
+use simulate::{Plant, Postures, Scene, Shapes};
 
 /// Least and greatest turn of a joint in a small move, radians; sliding joints move a fifth of
 /// that, in metres.
@@ -25,6 +28,8 @@ const WIRE: [f64; 2] = [0.002, 0.005];
 const PIPE: f64 = 0.010;
 /// Least distance of thin objects from scanned robots, metres: more than the margin of a check.
 const ASIDE: f64 = 0.08;
+/// Distance between places that stand for a surface, metres.
+const APART: f64 = 0.05;
 /// Length of a wire that hangs level, metres.
 const LENGTH: [f64; 2] = [1.0, 2.5];
 
@@ -66,7 +71,7 @@ pub(super) fn cell(wanted: &Plant, models: &[Model]) -> Result<(Scene, Vec<Vec<D
             scanner.position[2] -= random.between(0.6, 1.1);
         }
     }
-    let standing = standing(&scene, models);
+    let standing = standing(&scene, models)?;
     let mut paths = Vec::new();
     for robot in 0..scene.robots.len() {
         let mut own = Vec::new();
@@ -82,39 +87,21 @@ pub(super) fn cell(wanted: &Plant, models: &[Model]) -> Result<(Scene, Vec<Vec<D
     Ok((scene, paths))
 }
 
-/// A robot of a scene, as it stands.
-pub(super) struct SceneRobot<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) number: usize,
-    pub(super) model: &'a Model,
-    pub(super) posture: Vec<f64>,
-    world_from_base: Pose,
-}
-
-impl<'a> SceneRobot<'a> {
-    /// The robot of this number; none where its model is not among these.
-    pub(super) fn of(scene: &'a Scene, models: &'a [Model], number: usize) -> Option<Self> {
-        let place = &scene.robots[number];
-        let model = models.iter().find(|m| m.name == place.model)?;
-        let home = model.home().into_iter().zip(&model.free);
-        let value = |(home, joint): (f64, &usize)| {
-            place.posture.get(&model.joints[*joint].name).copied().unwrap_or(home)
-        };
-        let (posture, world_from_base) = (home.map(value).collect(), place.world_from_base());
-        Some(Self { scene, number, model, posture, world_from_base })
-    }
-}
-
-/// Places on the robots as they stand, world, metres.
-fn standing(scene: &Scene, models: &[Model]) -> Vec<Point> {
+/// Places on the robots as they stand, and on what hangs on them, world, metres.
+fn standing(scene: &Scene, models: &[Model]) -> Result<Vec<Point>> {
+    let shapes = Shapes::of(scene, models)?;
+    let hanging = shapes.all.iter().filter(|s| s.robot.is_some() && !s.is_of_model);
     let mut out = Vec::new();
+    for t in hanging.flat_map(|s| &s.triangles) {
+        on_triangle(&t.map(Vec3::from_array), APART, |p| out.push(p));
+    }
     for robot in 0..scene.robots.len() {
         let Some(robot) = SceneRobot::of(scene, models, robot) else { continue };
         for (link, pose) in robot.model.links.iter().zip(robot.model.poses(&robot.posture)) {
             out.extend(places(&link.cad.points, &(robot.world_from_base * pose)));
         }
     }
-    out
+    Ok(out)
 }
 
 fn places<'p>(points: &'p [[f32; 3]], pose: &'p Pose) -> impl Iterator<Item = Point> + 'p {
@@ -168,7 +155,7 @@ fn thin(
 }
 
 /// How far a place is from a line between two others, metres.
-fn off(p: &Point, [a, b]: &[Point; 2]) -> f64 {
+pub(super) fn off(p: &Point, [a, b]: &[Point; 2]) -> f64 {
     let along = b - a;
     let at = ((p - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
     (p - (a + along * at)).norm()

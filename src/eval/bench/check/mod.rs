@@ -3,7 +3,9 @@
 
 mod bodies;
 mod draw;
+mod met;
 mod row;
+mod scene_robot;
 mod table;
 mod truth;
 
@@ -18,15 +20,16 @@ use crate::eval::virtual_scan::{Formats, scan_scene};
 use crate::job::{Job, Means};
 use crate::plan;
 use contract::{Error, Result};
-use draw::{DrawnPath, SceneRobot};
+use draw::DrawnPath;
 use export::{ResultFile, atomic};
 use robot::Model;
-use row::{CheckRow, PathRow, True};
+use row::{CheckRow, PathRow};
+use scene_robot::SceneRobot;
 use simulate::random::Random;
 use simulate::{Plant, Scene, Shapes};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use truth::{PathTruth, TOUCH};
+use truth::PathTruths;
 
 /// Request of the bench.
 #[derive(Debug, Clone)]
@@ -99,6 +102,7 @@ impl Bench<'_> {
         let started = Instant::now();
         let agreement = Agreement::of(&job.out, &scans.join("truth"))?;
         let shapes = Shapes::of(&scene, models)?;
+        let unmet = met::unmet(&scene, &job.out, engine)?;
         row.n_robots = scene.robots.len();
         for (robot, thin) in thin.into_iter().enumerate() {
             let is_found = agreement.robots[robot]
@@ -108,7 +112,8 @@ impl Bench<'_> {
             if is_found {
                 row.n_checked += 1;
                 if let Some(robot) = SceneRobot::of(&scene, models, robot) {
-                    row.paths.extend(self.robot(&robot, &shapes, thin, &job.out, row.seed)?);
+                    let truth = PathTruths::new(&robot, &shapes, &unmet)?;
+                    row.paths.extend(self.robot(&robot, &truth, thin, &job.out, row.seed)?);
                 }
             }
         }
@@ -120,15 +125,14 @@ impl Bench<'_> {
     fn robot(
         &self,
         robot: &SceneRobot<'_>,
-        shapes: &Shapes,
+        truth: &PathTruths<'_>,
         mut paths: Vec<DrawnPath>,
         out: &Path,
         seed: u64,
     ) -> Result<Vec<PathRow>> {
-        let &SceneRobot { scene, number, model, .. } = robot;
-        let truth = PathTruth::new(scene, shapes, number, model, &robot.posture)?;
+        let &SceneRobot { scene, number, .. } = robot;
         let mut random = Random::keyed(&[seed, number as u64, 0x9A7]);
-        paths.extend(draw::paths(robot, &truth, &mut random)?);
+        paths.extend(draw::paths(robot, &truth.met, &mut random)?);
         let request = CheckRequest {
             out: out.to_path_buf(),
             trajectory: PathBuf::new(),
@@ -139,7 +143,7 @@ impl Bench<'_> {
         };
         let choose = |result: &ResultFile, _: &_| nearest(result, scene, number);
         let look = |place: &RobotSite<'_>| {
-            let one = |path: &DrawnPath| self.path(place, robot, path, &truth);
+            let one = |path: &DrawnPath| self.path(place, robot, path, truth);
             paths.iter().map(one).collect::<Result<Vec<PathRow>>>()
         };
         at_robot(&request, choose, self.means, self.engine, look)
@@ -151,7 +155,7 @@ impl Bench<'_> {
         place: &RobotSite<'_>,
         robot: &SceneRobot<'_>,
         path: &DrawnPath,
-        truth: &PathTruth<'_>,
+        truth: &PathTruths<'_>,
     ) -> Result<PathRow> {
         let (model, from) = (robot.model, &robot.posture[..]);
         self.engine.cancel.check()?;
@@ -162,13 +166,7 @@ impl Bench<'_> {
             times: Vec::new(),
         };
         let report = place.check_path(&asked, self.engine)?;
-        let nearest = truth.along(from, &path.to, margin);
-        let is = match nearest.gap {
-            ..=TOUCH => True::Collides,
-            gap if gap < margin => True::Grazes,
-            _ if truth.is_seen(from, &path.to, margin) => True::Free,
-            _ => True::Unseen,
-        };
+        let (is, nearest) = truth.of(from, &path.to, margin);
         Ok(PathRow {
             robot: robot.scene.robots[robot.number].name.clone(),
             model: model.name.clone(),

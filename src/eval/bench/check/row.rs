@@ -1,22 +1,9 @@
 //! Rows of the path bench: truth and outcome of each path, and counts of each cell.
 
 use super::draw::PathKind;
+use super::truth::True;
 use crate::eval::bench::cases::CaseRow;
 use serde::Serialize;
-
-/// Truth of a path, from the scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum True {
-    /// The path keeps the margin, and scanners saw its space with the margin.
-    Free,
-    /// The path keeps the margin.
-    Unseen,
-    /// The path comes nearer than the margin without a collision.
-    Grazes,
-    /// The path collides.
-    Collides,
-}
 
 /// A path that was checked.
 #[derive(Debug, Clone, Serialize)]

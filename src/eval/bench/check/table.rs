@@ -1,8 +1,9 @@
 //! Tables of the path bench for people, and one line per path for programs.
 
 use super::super::sheet;
-use super::row::{CheckRow, PathRow, True};
-use crate::check::PathOutcome;
+use super::row::{CheckRow, PathRow};
+use super::truth::True;
+use crate::check::{PathDoubt, PathOutcome};
 use contract::{Result, quote};
 use std::fmt::Write as _;
 
@@ -16,24 +17,27 @@ fn words(of: True) -> &'static str {
         True::Free => "keeps the margin, in seen space",
         True::Unseen => "keeps the margin, not all of its space was seen",
         True::Grazes => "nearer than the margin, touches nothing",
+        True::Unmet => "nearer than the margin to a wire that no beam met",
         True::Collides => "collides",
     }
 }
 
 /// Counts, shares and reasons.
 pub(super) fn table(rows: &[CheckRow]) -> String {
-    let all: Vec<&PathRow> = rows.iter().flat_map(|r| &r.paths).collect();
+    let every: Vec<&PathRow> = rows.iter().flat_map(|r| &r.paths).collect();
+    // Of a robot whose posture is not certain nothing is called free.
+    let (doubtful, all): (Vec<&PathRow>, Vec<&PathRow>) =
+        every.iter().partition(|p| p.doubts.iter().any(|d| d == PathDoubt::Posture.word()));
     let mut out = String::from(
         "| what is true of a path | paths | free | unknown | near | blocked |\n| --- | --- | --- | --- | --- | --- |\n",
     );
-    for of in [True::Free, True::Unseen, True::Grazes, True::Collides] {
+    for of in [True::Free, True::Unseen, True::Grazes, True::Unmet, True::Collides] {
         let own: Vec<&&PathRow> = all.iter().filter(|p| p.truth == of).collect();
         let n = |outcome| own.iter().filter(|p| p.outcome == outcome).count();
         let counts: Vec<String> = OUTCOMES.iter().map(|o| n(o.word()).to_string()).collect();
         let _ = writeln!(out, "| {} | {} | {} |", words(of), own.len(), counts.join(" | "));
     }
     let count = |is: &dyn Fn(&PathRow) -> bool| all.iter().filter(|p| is(p)).count();
-    let free = |p: &PathRow| p.outcome == PathOutcome::Free.word();
     let seen = count(&|p| p.truth == True::Free);
     let right = count(&|p| p.truth == True::Free && free(p));
     let _ = writeln!(
@@ -42,7 +46,7 @@ pub(super) fn table(rows: &[CheckRow]) -> String {
          free, called near or blocked: {}; {} robots of {} looked at",
         rows.len(),
         all.len(),
-        count(&|p| p.truth == True::Collides && free(p)),
+        every.iter().filter(|p| is_missed(p)).count(),
         100.0 * right as f64 / seen.max(1) as f64,
         count(&|p| p.is_wolf()),
         rows.iter().map(|r| r.n_checked).sum::<usize>(),
@@ -54,14 +58,32 @@ pub(super) fn table(rows: &[CheckRow]) -> String {
     out += &reasons("\nNot all seen, and called near or blocked:", &all, &|p: &PathRow| {
         p.truth == True::Unseen && p.is_wolf()
     });
-    let missed = all.iter().filter(|p| p.truth == True::Collides && free(p));
-    for path in missed {
+    if !doubtful.is_empty() {
+        let n = |is: &dyn Fn(&PathRow) -> bool| doubtful.iter().filter(|p| is(p)).count();
+        let _ = writeln!(
+            out,
+            "\nBesides {} paths of robots whose posture is not certain: {} called free, {} unknown; {} keep the margin in seen space",
+            doubtful.len(),
+            n(&free),
+            n(&|p| p.outcome == PathOutcome::Unknown.word()),
+            n(&|p| p.truth == True::Free),
+        );
+    }
+    for path in every.iter().filter(|p| is_missed(p)) {
         let _ = writeln!(out, "MISSED: {}", path.line());
     }
     for row in rows.iter().filter(|r| r.failed.is_some()) {
         let _ = writeln!(out, "- {}: {}", row.seed, row.failed.as_deref().unwrap_or_default());
     }
     out
+}
+
+fn free(path: &PathRow) -> bool {
+    path.outcome == PathOutcome::Free.word()
+}
+
+fn is_missed(path: &PathRow) -> bool {
+    path.truth == True::Collides && free(path)
 }
 
 /// Paths of a kind by what was said of them.

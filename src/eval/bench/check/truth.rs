@@ -2,6 +2,7 @@
 //! and whether scanners could see the space that it passes.
 
 use super::bodies::{MeshPart, OWN_SAMPLE, OwnVolume, hose_pieces, pieces, places};
+use super::scene_robot::SceneRobot;
 use contract::Result;
 use geometry::{Point, Pose};
 use glamx::Vec3;
@@ -9,8 +10,9 @@ use parry3d::partitioning::BvhNode;
 use parry3d::query;
 use parry3d::shape::{TriMesh, Triangle};
 use robot::Model;
-use simulate::{BodyShape, Scene, Shapes};
+use simulate::{BodyShape, Shapes};
 use std::cell::Cell;
+use std::collections::BTreeSet;
 
 /// Greatest distance that is computed, metres.
 pub(super) const FAR: f64 = 0.1;
@@ -28,6 +30,22 @@ const SEEN_BESIDE: f64 = 0.0125;
 const SEEN_STEP: f64 = 0.02;
 /// Range of the virtual scanners, metres.
 const RANGE: f64 = 80.0;
+
+/// Truth of a path, from the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum True {
+    /// The path keeps the margin, and scanners saw its space with the margin.
+    Free,
+    /// The path keeps the margin.
+    Unseen,
+    /// The path comes nearer than the margin without a collision.
+    Grazes,
+    /// The path comes nearer than the margin to something that no beam met, or collides with it.
+    Unmet,
+    /// The path collides.
+    Collides,
+}
 
 /// A robot of a scene among all else.
 pub(super) struct PathTruth<'a> {
@@ -58,15 +76,51 @@ pub(super) struct Nearest {
     pub(super) at: f64,
 }
 
-impl<'a> PathTruth<'a> {
-    /// Of the robot of this index, as it stands in the scene.
+/// A robot among what beams met, and among everything.
+pub(super) struct PathTruths<'a> {
+    pub(super) met: PathTruth<'a>,
+    /// `None` where beams met everything.
+    all: Option<PathTruth<'a>>,
+}
+
+impl<'a> PathTruths<'a> {
+    /// Of a robot, as it stands in its scene, with the names of what no beam met.
     pub(super) fn new(
-        scene: &Scene,
+        robot: &SceneRobot<'a>,
         shapes: &'a Shapes,
-        robot: usize,
-        model: &'a Model,
-        posture: &[f64],
+        unmet: &BTreeSet<String>,
     ) -> Result<Self> {
+        let all = (!unmet.is_empty()).then(|| PathTruth::new(robot, shapes, &BTreeSet::new()));
+        Ok(Self { met: PathTruth::new(robot, shapes, unmet)?, all: all.transpose()? })
+    }
+
+    /// What is true of a path, and the nearest that it comes to something.
+    pub(super) fn of(&self, from: &[f64], to: &[f64], margin: f64) -> (True, Nearest) {
+        let nearest = self.met.along(from, to, margin);
+        if nearest.gap <= TOUCH {
+            return (True::Collides, nearest);
+        }
+        let among_all = self.all.as_ref().map(|all| all.along(from, to, margin));
+        if let Some(unmet) = among_all.filter(|unmet| unmet.gap < nearest.gap.min(margin)) {
+            return (True::Unmet, unmet);
+        }
+        let is = match nearest.gap {
+            gap if gap < margin => True::Grazes,
+            _ if self.met.is_seen(from, to, margin) => True::Free,
+            _ => True::Unseen,
+        };
+        (is, nearest)
+    }
+}
+
+impl<'a> PathTruth<'a> {
+    /// Of a robot, as it stands in its scene. Shapes with these names are left out.
+    pub(super) fn new(
+        robot: &SceneRobot<'a>,
+        shapes: &'a Shapes,
+        left_out: &BTreeSet<String>,
+    ) -> Result<Self> {
+        let &SceneRobot { scene, number: robot, model, ref posture, .. } = robot;
         let world_from_base = scene.robots[robot].world_from_base();
         let poses = placed(model, &world_from_base, posture);
         let moves = model.moving();
@@ -81,7 +135,8 @@ impl<'a> PathTruth<'a> {
         let foot = world_from_base.translation.vector.map(|v| v as f32);
         let (foot, reach) = (Vec3::from_array(foot.into()), clearance::reach(model) as f32 + 0.5);
         let (mut corners, mut triangles, mut of) = (Vec::new(), Vec::new(), Vec::new());
-        for (at, shape) in shapes.all.iter().enumerate().filter(|(_, s)| !is_own(s)) {
+        let stands = |s: &BodyShape| !is_own(&s) && !left_out.contains(&s.name);
+        for (at, shape) in shapes.all.iter().enumerate().filter(|(_, s)| stands(s)) {
             for t in &shape.triangles {
                 pieces(t.map(Vec3::from_array), foot, reach, &mut |t| {
                     let first = corners.len() as u32;
