@@ -71,8 +71,9 @@ pub struct PathReport {
     pub n_waypoints: usize,
     /// Number of postures that were checked.
     pub n_postures: usize,
-    /// Largest distance between neighbouring beams where the robot moves, metres; `None` without
-    /// scanners of known position. Thinner things may stand there without a single point.
+    /// Largest distance on the way between neighbouring beams of the scanner that resolves a place
+    /// best, metres, whether or not it sees the place; `None` without scanners of known position.
+    /// Thinner things may stand there without a single point.
     pub beam_spacing: Option<f64>,
     /// Times of the waypoints, seconds; empty where the path states none.
     pub times: Vec<f64>,

@@ -189,7 +189,8 @@ impl PathReport {
         if let Some(apart) = self.beam_spacing {
             let _ = write!(
                 text,
-                ", and what is thinner than {:.0} mm: so far apart are neighbouring beams on the way",
+                ", and what is thinner than {:.0} mm: neighbouring beams of the nearest scanner are so far \
+                 apart on the way, and those of others farther",
                 (apart * 1e3).ceil()
             );
         }

@@ -3,8 +3,7 @@
 
 use super::robots::{Observed, RobotState, compare_robot};
 use super::session::{CellComparison, CellLabels, ComparedRobots, ground};
-use crate::detect::robots::{FittedRobots, RobotList};
-use crate::detect::robots::{region, standing};
+use crate::detect::robots::{FittedRobots, RobotList, region, standing};
 use crate::detect::search::Search;
 use crate::detect::tools;
 use crate::engine::{Engine, Task};

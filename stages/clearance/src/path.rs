@@ -107,8 +107,9 @@ impl<'a> PathWalk<'a> {
     }
 
     /// Distance between neighbouring beams where moving parts are at the waypoints, and half-way
-    /// between them, metres: the largest, each by the scanner that resolves the place best. `None`
-    /// without scanners of known position. Thinner things may stand there without a single point.
+    /// between them, metres: the largest, each by the scanner that resolves the place best, whether
+    /// or not it sees the place. `None` without scanners of known position. Thinner things may
+    /// stand there without a single point.
     #[must_use]
     pub fn beam_spacing(&self) -> Option<f64> {
         let halves = self.path.windows(2).map(|leg| between(&leg[0], &leg[1], 0.5));

@@ -1,7 +1,7 @@
 //! Contacts of an arm on paths past synthetic points.
 
 use super::*;
-use crate::{Cells, KnownBounds};
+use crate::{Cells, KnownBounds, ScannerAt};
 use contract::{OneByOne, Space, SpaceGrid, SpaceKind};
 use geometry::{Aabb, Pose};
 use robot::{Model, Settings};
@@ -214,4 +214,32 @@ fn space_of_which_nothing_is_known_is_not_free() {
     let found = contacts(&walk);
     assert!(found.len() == 1 && found[0].what == ObstacleKind::Unseen && found[0].at.is_none());
     assert!(found[0].from > 0.0 && found[0].to == 1.0, "{found:?}");
+}
+
+#[test]
+fn points_between_a_wire_that_another_scanner_knows_and_a_surface_are_no_obstacle() {
+    let eye = |at: [f64; 3]| ScannerAt { at: at.into(), step: 0.003 };
+    let eyes = BTreeMap::from([(1, eye([-3.0, 0.0, 0.0])), (2, eye([0.0, -3.0, 0.0]))]);
+    let bounds = Aabb { min: [-4.0; 3], max: [4.0; 3] };
+    let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
+    space.voxels_mut().fill(SpaceKind::Free);
+    let n_near_zero = |has_wire: bool| {
+        let mut cells = Cells::within(2.0, &eyes);
+        let mut add = |p: [f64; 3], source: u16| {
+            cells.add_measurement(&p.into(), source);
+            cells.add(p, ObstacleKind::Fixed, false, source);
+        };
+        // All that the first scanner has of the wire, on a line 0.5 m behind it.
+        (0..5).for_each(|k| add([0.0, 0.0, 0.03 * f64::from(k)], 1));
+        if has_wire {
+            (0..100).for_each(|k| add([-0.5, 0.0, 0.01 * f64::from(k) - 0.5], 2));
+        }
+        cells.remove_duplicates();
+        let known = KnownBounds { world_from_base: Pose::identity(), bounds };
+        let around = Obstacles::new(&cells, &[], Some(&space), known);
+        let is_near_zero = |o: &&crate::obstacle::Obstacle| o.is_point() && o.at[0].abs() < 0.1;
+        around.all.iter().filter(is_near_zero).count()
+    };
+    // Without the wire they may be a wire themselves.
+    assert_eq!([n_near_zero(false), n_near_zero(true)], [5, 0]);
 }
