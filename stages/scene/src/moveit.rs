@@ -1,0 +1,158 @@
+//! Writes what MoveIt is given beside a URDF: the SRDF with groups and the found posture, and the
+//! planning scene with the fixed world and the other robots as they stand.
+//!
+//! ```text
+//! R1/robot.srdf    groups, the state `as_found`, passive joints, pairs that may touch
+//! R1/plant.scene   the fixed world as boxes, the floor, the other robots' links as meshes
+//! ```
+
+use crate::joint_rules::JointRule;
+use crate::link_pairs::{PairReason, link_pairs};
+use crate::names::{NameMap, NameRule};
+use crate::output::{RobotToWrite, SceneFiles, names_by_robot, names_table};
+use crate::plant_scene::{FLOOR_DEPTH, PlantScene};
+use crate::text::{XmlText, num, nums};
+use crate::urdf;
+use contract::{Result, quote};
+use geometry::Pose;
+use std::fmt::Write as _;
+
+/// Writes URDF and SRDF of each robot.
+///
+/// # Errors
+/// A scene that [`PlantScene::check`] refuses.
+pub fn srdf(scene: &PlantScene, package: Option<&str>) -> Result<SceneFiles> {
+    written(scene, package, false)
+}
+
+/// Writes URDF, SRDF and planning scene of each robot.
+///
+/// # Errors
+/// A scene that [`PlantScene::check`] refuses.
+pub fn moveit(scene: &PlantScene, package: Option<&str>) -> Result<SceneFiles> {
+    written(scene, package, true)
+}
+
+fn written(scene: &PlantScene, package: Option<&str>, with_scene: bool) -> Result<SceneFiles> {
+    scene.check()?;
+    let robots = RobotToWrite::all(scene);
+    let names = names_by_robot(&robots, NameRule::Urdf);
+    let mut out = SceneFiles::default();
+    for own in &robots {
+        let folder = quote::file_name(&own.robot.id);
+        urdf::write(own, &names, package, &mut out);
+        out.add(format!("{folder}/robot.srdf"), semantics(own, &names));
+        if with_scene {
+            let others: Vec<_> = robots.iter().filter(|other| other.at != own.at).collect();
+            out.add(format!("{folder}/plant.scene"), planning_scene(scene, &others));
+        }
+    }
+    out.add("names.csv", names_table(&robots, &names));
+    Ok(out)
+}
+
+fn semantics(own: &RobotToWrite<'_>, names: &NameMap) -> Vec<u8> {
+    let model = &own.robot.model;
+    let joint = |j: usize| names.joint(own.at, j);
+    let mut xml = XmlText::new();
+    xml.open("robot", &[("name", &urdf::robot_name(own))]);
+    let is_moved = |j: &usize| own.rules.rules[*j] == JointRule::Free;
+    let (chain, others): (Vec<usize>, Vec<usize>) =
+        own.moving().filter(is_moved).partition(|j| model.main_chain.contains(j));
+    let ends = model.main_chain.first().zip(model.main_chain.last());
+    if let Some((first, last)) = ends.filter(|_| !chain.is_empty()) {
+        let base = names.link(own.at, model.joints[*first].parent);
+        let tip = names.link(own.at, model.joints[*last].child);
+        xml.open("group", &[("name", "arm")]);
+        xml.empty("chain", &[("base_link", base), ("tip_link", tip)]);
+        xml.close();
+    }
+    if !others.is_empty() {
+        xml.open("group", &[("name", "others")]);
+        others.iter().for_each(|j| xml.empty("joint", &[("name", joint(*j))]));
+        xml.close();
+    }
+    for (group, joints) in [("arm", &chain), ("others", &others)] {
+        if joints.is_empty() {
+            continue;
+        }
+        xml.open("group_state", &[("name", "as_found"), ("group", group)]);
+        for j in joints {
+            xml.empty("joint", &[("name", joint(*j)), ("value", &num(own.values[*j]))]);
+        }
+        xml.close();
+    }
+    for j in own.moving().filter(|j| own.rules.rules[*j] == JointRule::Loop) {
+        xml.empty("passive_joint", &[("name", joint(j))]);
+    }
+    for (a, b, reason) in link_pairs(own.robot, &own.rules) {
+        let reason = match reason {
+            PairReason::Adjacent => "Adjacent",
+            PairReason::Overlap => "Default",
+        };
+        let [a, b] = [a, b].map(|l| names.link(own.at, l));
+        let pair = [("link1", a), ("link2", b), ("reason", reason)];
+        xml.empty("disable_collisions", &pair);
+    }
+    xml.finish()
+}
+
+/// Position and quaternion, a line each.
+fn pose_lines(text: &mut String, pose: &Pose) {
+    let (p, q) = (pose.translation.vector, pose.rotation.coords);
+    let _ = writeln!(text, "{}\n{}", nums(p.as_slice(), " "), nums(q.as_slice(), " "));
+}
+
+fn planning_scene(scene: &PlantScene, others: &[&RobotToWrite<'_>]) -> Vec<u8> {
+    let mut text = format!("{}\n", quote::file_name(&scene.name));
+    if !scene.fixed.is_empty() {
+        object(&mut text, "fixed", &Pose::identity(), scene.fixed.len());
+        for own in &scene.fixed {
+            let [x, y, z] = own.center;
+            let _ = writeln!(text, "box\n{}", nums(&own.size, " "));
+            pose_lines(&mut text, &Pose::translation(x, y, z));
+            text.push_str("0 0 0 0\n");
+        }
+        text.push_str("0\n");
+    }
+    if let Some(floor) = &scene.floor {
+        object(&mut text, "floor", &floor.world_from_floor, 1);
+        let [x, y] = floor.size;
+        let _ = writeln!(text, "box\n{}", nums(&[x, y, FLOOR_DEPTH], " "));
+        pose_lines(&mut text, &Pose::translation(0.0, 0.0, -FLOOR_DEPTH / 2.0));
+        text.push_str("0 0 0 0\n0\n");
+    }
+    for other in others {
+        let poses = other.robot.world_from_links();
+        for (link, pose) in poses.iter().enumerate() {
+            let bodies = other.robot.bodies(link);
+            if bodies.is_empty() {
+                continue;
+            }
+            let name = format!("{}_{link:02}", quote::file_name(&other.robot.id));
+            object(&mut text, &name, pose, bodies.len());
+            for body in bodies {
+                let (vertices, triangles) = (&body.mesh.vertices, &body.mesh.triangles);
+                let _ = writeln!(text, "mesh\n{} {}", vertices.len(), triangles.len());
+                for [x, y, z] in vertices {
+                    let _ = writeln!(text, "{x} {y} {z}");
+                }
+                for [a, b, c] in triangles {
+                    let _ = writeln!(text, "{a} {b} {c}");
+                }
+                pose_lines(&mut text, &Pose::identity());
+                text.push_str("0 0 0 0\n");
+            }
+            text.push_str("0\n");
+        }
+    }
+    text.push_str(".\n");
+    text.into_bytes()
+}
+
+/// Begins an object with a number of shapes. The blank behind the star tells the new format.
+fn object(text: &mut String, name: &str, pose: &Pose, n_shapes: usize) {
+    let _ = writeln!(text, "* {name}");
+    pose_lines(text, pose);
+    let _ = writeln!(text, "{n_shapes}");
+}
