@@ -13,6 +13,7 @@ use crate::result::changed_things::ThingEntry;
 use crate::result::changes::{changes, words};
 use crate::result::conversion::convert;
 use crate::result::history;
+use crate::result::scene_export::{SceneRequest, export_scene};
 use crate::{cache, check};
 use contract::words::count;
 use contract::{Error, Kind, Result};
@@ -53,8 +54,22 @@ pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
 }
 
 pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<u8> {
-    let engine = common.engine(&common.means()?)?;
-    let written = convert(&flags.out, flags.to, &engine)?;
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let written = match flags.to.scene() {
+        Some(format) => {
+            let request = SceneRequest {
+                out: flags.out.clone(),
+                format,
+                robots: flags.robots.clone(),
+                package: flags.package.clone(),
+            };
+            let (written, notes) = export_scene(&request, &means, &engine)?;
+            notes.iter().for_each(|note| say.warning(note));
+            written
+        }
+        None => convert(&flags.out, flags.to, &engine)?,
+    };
     let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
     say.result(&names.join("\n"));
     Ok(exit::OK)
