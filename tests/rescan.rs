@@ -23,7 +23,10 @@ const F1: f64 = 0.98;
 struct Plant {
     dir: tempfile::TempDir,
     n_masks: usize,
+    /// Where the robot stands that moves, in the second session.
     robot: [f64; 3],
+    /// Number of robots in the result of the first.
+    n_robots: usize,
 }
 
 impl Plant {
@@ -49,8 +52,9 @@ impl Plant {
             scan_scene(&scene, &models, &dir.path().join(name), formats, &Engine::new(2))
                 .expect("scans");
         }
-        let plant = Self { dir, n_masks, robot };
+        let mut plant = Self { dir, n_masks, robot, n_robots: 0 };
         plan::run(&plant.job("then", "base"), &Engine::new(2)).expect("the run ends well");
+        plant.n_robots = n_robots(&plant.path("base"));
         plant
     }
 
@@ -77,6 +81,12 @@ impl Plant {
     }
 }
 
+/// Number of robots in a result that are not refused.
+fn n_robots(out: &Path) -> usize {
+    let all = export::ResultFile::read(out).expect("a result").robots;
+    all.iter().filter(|robot| robot.verdict != "refused").count()
+}
+
 /// Points that a LAS 1.4 file says it holds.
 fn n_points(path: &Path) -> u64 {
     let bytes = std::fs::read(path).expect("a file");
@@ -88,9 +98,17 @@ fn changes(out: &Path) -> serde_json::Value {
     serde_json::from_str(&text).expect("it parses")
 }
 
+/// Both use one plant, which takes longer to scan and to run than either of them.
 #[test]
-fn a_rescanned_cell_is_brought_up_to_date() {
+fn cells_that_are_scanned_again() {
     let plant = Plant::new();
+    std::thread::scope(|both| {
+        both.spawn(|| a_rescanned_cell_is_brought_up_to_date(&plant));
+        both.spawn(|| a_robot_that_the_earlier_result_missed_did_not_appear(&plant));
+    });
+}
+
+fn a_rescanned_cell_is_brought_up_to_date(plant: &Plant) {
     let engine = Engine::new(2);
     rescan(&plant.request("base", "again"), &engine).expect("the rescan ends well");
     let out = plant.path("again");
@@ -155,7 +173,7 @@ fn a_rescanned_cell_is_brought_up_to_date() {
     for name in ["base", "again"] {
         spaces_hold_what_tiles_hold(&plant.path(name));
     }
-    goes_on(&plant, &out);
+    goes_on(plant, &out);
 }
 
 /// Each point of the tiles lies in a voxel that says so, in the space of each robot that has one
@@ -208,23 +226,18 @@ fn spaces_hold_what_tiles_hold(out: &Path) {
     }
 }
 
-#[test]
-fn a_robot_that_the_earlier_result_missed_did_not_appear() {
-    let plant = Plant::new();
+fn a_robot_that_the_earlier_result_missed_did_not_appear(plant: &Plant) {
     let review = format!("[[robot]]\nat = {:?}\nverdict = \"reject\"\n", plant.robot);
     std::fs::write(plant.path("review.toml"), review).expect("writes");
-    let args = ["run", "then/scans.e57", "--robots", "robots", "--out", "blind"];
+    let args = ["run", "then/scans.e57", "--robots", "robots", "--out", "missed/blind"];
     let blind = plant.run(&[&args[..], &["--review", "review.toml"]].concat());
     assert!(blind.status.success(), "{}", String::from_utf8_lossy(&blind.stderr));
-    let n_robots = |name: &str| {
-        let all = export::ResultFile::read(&plant.path(name)).expect("a result").robots;
-        all.iter().filter(|robot| robot.verdict != "refused").count()
-    };
-    assert_eq!(n_robots("blind") + 1, n_robots("base"));
+    assert_eq!(n_robots(&plant.path("missed/blind")) + 1, plant.n_robots);
 
     // Its scans show how it stood, though: it is said to have moved from there.
-    rescan(&plant.request("blind", "again"), &Engine::new(2)).expect("the rescan ends well");
-    let changes = changes(&plant.path("again"));
+    rescan(&plant.request("missed/blind", "missed/again"), &Engine::new(2))
+        .expect("the rescan ends well");
+    let changes = changes(&plant.path("missed/again"));
     let robots = changes["robots"].as_array().expect("robots");
     let others: Vec<_> = robots.iter().filter(|r| r["change"]["kind"] != "same").collect();
     assert!(others.len() == 1 && others[0]["was_missed"] == true, "{robots:#?}");
@@ -233,7 +246,7 @@ fn a_robot_that_the_earlier_result_missed_did_not_appear() {
     let kinds: Vec<_> = things.iter().filter_map(|t| t["change"].as_str()).collect();
     assert_eq!(kinds, ["moved", "gone"], "{things:#?}");
     let truth = plant.path("now/truth");
-    let agreement = Agreement::of_session(&plant.path("again"), &truth, plant.n_masks);
+    let agreement = Agreement::of_session(&plant.path("missed/again"), &truth, plant.n_masks);
     let agreement = agreement.expect("compares");
     assert!(agreement.robots.iter().all(|r| r.found.as_ref().is_some_and(|f| f.is_right)));
     assert!(agreement.points.f1() > F1, "{}", agreement.points.f1());

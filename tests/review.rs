@@ -16,10 +16,15 @@ const OFF: f64 = 0.05;
 const NEAR: f64 = 2e-4;
 
 fn run(dir: &Path, review: &str) -> Output {
+    run_with(dir, review, &[])
+}
+
+fn run_with(dir: &Path, review: &str, more: &[&str]) -> Output {
     std::fs::write(dir.join("review.toml"), review).expect("writes");
     let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
     command.current_dir(dir).args(["run", "scans/scans.e57", "--robots", "robots", "--out", "out"]);
     command.args(["--review", "review.toml", "--progress", "none"]);
+    command.args(more);
     command.output().expect("the program starts")
 }
 
@@ -80,4 +85,43 @@ fn a_posture_that_is_given_is_where_the_fit_begins_and_no_more() {
         said.contains("review.toml") && said.contains("no joint \"elbow\": there are "),
         "{said}"
     );
+}
+
+#[test]
+fn a_place_and_a_model_are_enough_where_the_run_finds_nothing_to_search() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let dir = dir.path();
+    // So many beams that the flange's turn is clear: it is coarse with a quarter of them, and a few
+    // samples decide on the verdict then.
+    palletiser(dir, 12, 4 * N_BEAMS);
+    let found = result(dir, "")["robots"][0].clone();
+    let base: Vec<f64> =
+        (0..3).map(|i| found["base_pose"]["xyz"][i].as_f64().expect("a number")).collect();
+    // No body of this many points is there, so that no region is searched.
+    let nothing = ["--set", "region.min_points=1000000000"];
+    let robots = |review: &str| {
+        let output = run_with(dir, review, &nothing);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read_to_string(dir.join("out/result.json")).expect("a result");
+        let result: Value = serde_json::from_str(&text).expect("JSON");
+        result["robots"].as_array().expect("robots").clone()
+    };
+    assert_eq!(robots("").len(), 0);
+    let at = format!("[{}, {}, {}]", base[0] + 0.15, base[1] - 0.2, base[2] + 0.1);
+    let place = format!("[[robot]]\nat = {at}\nmodel = {}\n", found["model"]);
+    let same = |hinted: &[Value]| {
+        assert_eq!(hinted.len(), 1, "{hinted:?}");
+        assert_eq!(hinted[0]["verdict"], "trusted", "{:#}", hinted[0]);
+        for ((name, a), (_, b)) in joints(&found).iter().zip(joints(&hinted[0])) {
+            let sigma = found["sigma"][name].as_f64().expect("a deviation");
+            assert!((a - b).abs() < NEAR.max(4.0 * sigma), "{name}: {a} and {b} ± {sigma}");
+        }
+    };
+    same(&robots(&place));
+    // The posture without the turn of the base.
+    let near: Vec<String> = joints(&found)
+        .into_iter()
+        .map(|(name, value)| format!("{name} = {}", value + OFF))
+        .collect();
+    same(&robots(&format!("{place}joints = {{ {} }}\n", near.join(", "))));
 }

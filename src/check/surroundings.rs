@@ -2,8 +2,8 @@
 
 use super::CheckedRobot;
 use crate::cache::{VerifiedFiles, tiles_of};
+use crate::detect::robots::poses;
 use crate::engine::{Engine, Task};
-use crate::label::known_space::poses;
 use crate::result::plant_state::PlantState;
 use clearance::{
     AttachedPoints, CELL, Cells, KnownBounds, ObstacleKind, Obstacles, ScannerAt, Shadow,

@@ -11,9 +11,15 @@
 //! rpy = [0.0, 0.0, 1.57]        # with joints: orientation of the base, whose origin is `at`
 //! ```
 //!
+//! An entry with a model and without joints starts a search around its place where no robot of the
+//! model is trusted there, also where the run found no region to search. The yaw and the height of
+//! the base are open. So they are for an entry with joints and without `rpy`, where the posture
+//! does not stand on a base that was found.
+//!
 //! The user keeps the file and passes it to every run, so that its statements survive reruns.
 
 mod effects;
+mod hints;
 
 use super::search::Search;
 use crate::engine::{AllThreads, Engine, Task};
@@ -134,16 +140,14 @@ impl Review {
                 })
             },
         )?;
-        let mut wrong = Vec::new();
-        for ((k, _), fit) in starts.iter().zip(found) {
+        let mut open = Vec::new();
+        for ((k, start), fit) in starts.into_iter().zip(found) {
             match fit.flatten() {
-                Some(fit) => {
-                    fits.retain(|f| !self.places[*k].has(f));
-                    fits.push(fit);
-                }
-                None => wrong.push(*k),
+                Some(fit) => self.replace(&mut fits, k, fit),
+                None => open.push((k, start)),
             }
         }
+        let wrong = self.search_for(&mut fits, open, search, engine)?;
         Ok((fits, wrong))
     }
 

@@ -1,6 +1,7 @@
-//! The fits of a plant together with their models.
+//! The fits of a plant together with their models, and where the links of a fitted robot are.
 
-use contract::Fit;
+use contract::{Fit, Region};
+use geometry::{Aabb, Point, Pose};
 use robot::Model;
 
 /// Fits of a plant and their models, borrowed.
@@ -23,4 +24,28 @@ impl RobotList {
     pub(crate) fn view(&self) -> FittedRobots<'_> {
         FittedRobots { fits: &self.fits, models: &self.models }
     }
+}
+
+/// Poses of the links of a fitted robot in the world frame.
+pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
+    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
+    model.poses(&posture).into_iter().map(|p| fit.world_from_base * p).collect()
+}
+
+/// Bounds of a robot in its fitted posture, world frame, metres.
+pub(crate) fn standing(fit: &Fit, model: &Model) -> Aabb {
+    let mut out = Aabb::EMPTY;
+    for (link, pose) in model.links.iter().zip(poses(fit, model)) {
+        if !link.bounds.is_empty() {
+            link.bounds.corners().into_iter().for_each(|c| out.add((pose * Point::from(c)).into()));
+        }
+    }
+    out
+}
+
+/// A region with bounds `world` and a frame whose origin is near `middle`, metres.
+pub(crate) fn region(middle: &Point, world: &Aabb) -> Region {
+    let origin = middle.map(f64::round);
+    let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
+    Region { origin, bounds: Aabb { min: shift(world.min), max: shift(world.max) } }
 }

@@ -1,13 +1,13 @@
 //! Known space around each robot: which voxels beams have passed through, which the robot and
 //! others fill, and which no scan has seen. Points are marked in it while they are labelled.
 
-use crate::detect::robots::FittedRobots;
+use crate::detect::robots::{FittedRobots, poses, region, standing};
 use crate::detect::search::Search;
 use crate::engine::{AllThreads, Engine, Task};
 use crate::job::Settings;
 use contract::{Fit, Label, Region, Result, Space, SpaceGrid, SpaceKind, Verdict};
 use freespace::PassedVoxels;
-use geometry::{Aabb, Point, Pose, Vector};
+use geometry::{Aabb, Point, Vector};
 use lattice::ViewSettings;
 use robot::Model;
 use std::ops::Range;
@@ -83,28 +83,10 @@ impl KnownSpaces<'_, '_> {
     }
 }
 
-/// Bounds of a robot in its fitted posture, world frame, metres.
-pub(crate) fn standing(fit: &Fit, model: &Model) -> Aabb {
-    let mut out = Aabb::EMPTY;
-    for (link, pose) in model.links.iter().zip(poses(fit, model)) {
-        if !link.bounds.is_empty() {
-            link.bounds.corners().into_iter().for_each(|c| out.add((pose * Point::from(c)).into()));
-        }
-    }
-    out
-}
-
 /// The region of all positions that a robot can reach.
 pub(crate) fn reach(fit: &Fit, model: &Model) -> Region {
     let base: Point = fit.world_from_base.translation.vector.into();
     region(&base, &bounds(fit, model.reach()))
-}
-
-/// A region with bounds `world` and a frame whose origin is near `middle`, metres.
-pub(crate) fn region(middle: &Point, world: &Aabb) -> Region {
-    let origin = middle.map(f64::round);
-    let shift = |p: [f64; 3]| std::array::from_fn(|i| p[i] - origin[i]);
-    Region { origin, bounds: Aabb { min: shift(world.min), max: shift(world.max) } }
 }
 
 /// Bounds of all positions within `reach` of a robot, but behind its foot no farther than pedestals
@@ -121,12 +103,6 @@ pub(crate) fn bounds(fit: &Fit, reach: f64) -> Aabb {
         out.max[2] = base.z + BEHIND * reach;
     }
     out
-}
-
-/// Poses of the links of a fitted robot in the world frame.
-pub(crate) fn poses(fit: &Fit, model: &Model) -> Vec<Pose> {
-    let posture: Vec<f64> = fit.joints.iter().map(|j| j.value).collect();
-    model.poses(&posture).into_iter().map(|p| fit.world_from_base * p).collect()
 }
 
 /// Index of a space, index of a voxel in it, and the kind that a point gives to that voxel.
@@ -178,6 +154,7 @@ pub(crate) fn mark(spaces: &mut [Option<Space>], spots: impl IntoIterator<Item =
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geometry::Pose;
     use std::f64::consts::{FRAC_PI_2, PI};
 
     #[test]

@@ -6,12 +6,13 @@
 //! that of the list, or else that of its position alone (floor or fixed).
 
 use super::cluster_lookup::ClusterLookup;
-use super::known_space::{SpaceGrids, mark, poses};
+use super::known_space::{SpaceGrids, mark};
 use super::label_strips::{LabelStrip, LabelledStrip};
 use super::masks::{MaskCount, Masks};
 use super::near_robots::{NearRobots, ScansNearRobots};
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
+use crate::detect::robots::poses;
 use crate::engine::{AllThreads, Engine, PipeSender, PipedItems, Task};
 use crate::io::read_parts::InputReader;
 use crate::job::Settings;

@@ -4,10 +4,10 @@
 use super::robots::{Observed, RobotState, compare_robot};
 use super::session::{CellComparison, CellLabels, ComparedRobots, ground};
 use crate::detect::robots::{FittedRobots, RobotList};
+use crate::detect::robots::{region, standing};
 use crate::detect::search::Search;
 use crate::detect::tools;
 use crate::engine::{Engine, Task};
-use crate::label::known_space::{region, standing};
 use crate::label::labelling::{Labelling, ScansToLabel};
 use crate::label::near_robots::NearRobots;
 use change::Thing;

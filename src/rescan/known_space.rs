@@ -5,8 +5,9 @@
 use super::found::RescanFindings;
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
+use crate::detect::robots::poses;
 use crate::engine::{Engine, Task};
-use crate::label::known_space::{KnownSpaces, VoxelMark, bounds, mark, poses};
+use crate::label::known_space::{KnownSpaces, VoxelMark, bounds, mark};
 use contract::{Result, Space, SpaceGrid, SpaceKind};
 use export::{SpaceEntry, write_space};
 use freespace::PassedVoxels;

@@ -1,7 +1,7 @@
 //! Decides whether another model may stand on the base of an earlier robot, from the fit of the
 //! earlier model and both sessions. Only then all models are searched.
 
-use crate::label::known_space::poses;
+use crate::detect::robots::poses;
 use contract::{Fit, Verdict};
 use fit::MeasuredScene;
 use freespace::{Visibility, VisibilityQuery};

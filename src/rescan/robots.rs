@@ -2,9 +2,10 @@
 //! or lost.
 
 use super::other_model::is_the_same;
+use crate::detect::robots::{self, poses};
 use crate::detect::search::Search;
 use crate::detect::tools::attach_tools_in;
-use crate::label::known_space::{poses, reach};
+use crate::label::known_space::reach;
 use contract::{Fit, Region, Result, Verdict};
 use fit::MeasuredScene;
 use fit::verdict::{self, VerdictEvent};
@@ -216,7 +217,7 @@ fn beside(region: &Region, base: Point) -> Region {
         bounds.min[i] = bounds.min[i].max(base[i] - FAR_REACH);
         bounds.max[i] = bounds.max[i].min(base[i] + FAR_REACH);
     }
-    crate::label::known_space::region(&bounds.center(), &bounds)
+    robots::region(&bounds.center(), &bounds)
 }
 
 /// The region of the new scans that contains a robot; its whole reach where none does.

@@ -28,6 +28,7 @@ const FREE: [&str; 19] = [
     "frame",
     "freespace",
     "geometry",
+    "ingest",
     "lattice",
     "register",
     "robot",

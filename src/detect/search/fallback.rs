@@ -102,7 +102,7 @@ impl Search<'_, '_> {
     }
 
     /// Ceilings, walls and tilted plates near the region.
-    fn mounts(&self, region: &Region) -> Vec<InstallationPlane> {
+    pub(super) fn mounts(&self, region: &Region) -> Vec<InstallationPlane> {
         let world = region.world_bounds().grown(0.3);
         let sides = self.ground.surfaces.sides.iter();
         floor::mounts(&sides.filter(|p| p.bounds.touches(&world)).collect::<Vec<_>>())

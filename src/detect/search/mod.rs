@@ -2,6 +2,7 @@
 //! the library through base search and fit.
 
 mod fallback;
+pub(crate) mod hint;
 mod tried;
 mod views;
 
@@ -217,13 +218,8 @@ impl<'a, 'm> Search<'a, 'm> {
         min_score: f64,
         breadth: usize,
     ) -> Vec<Candidate> {
-        let guessed = planes.iter().all(InstallationPlane::is_guess);
         let search = |index: usize| {
-            let model = &self.library.models[index];
-            let search = BaseSearch::new(index, model, sight, &self.settings.base_search);
-            let search = search.map(|s| if guessed { s.on_guessed_planes() } else { s });
-            let search = search.map(|s| s.with_min_score(min_score).with_breadth(breadth));
-            let found = search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default();
+            let found = self.candidates_of(index, sight, planes, min_score, breadth);
             self.pieces.done();
             found
         };
@@ -234,6 +230,23 @@ impl<'a, 'm> Search<'a, 'm> {
             found.into_iter().flatten().filter(|c| !c.bases.is_empty()).collect();
         out.sort_by(|a, b| b.bases[0].1.total_cmp(&a.bases[0].1).then(a.model.cmp(&b.model)));
         out
+    }
+
+    /// The same of one model, in the order of the base search.
+    fn candidates_of(
+        &self,
+        index: usize,
+        sight: &RegionEvidence<'_>,
+        planes: &[InstallationPlane],
+        min_score: f64,
+        breadth: usize,
+    ) -> Vec<Candidate> {
+        let guessed = planes.iter().all(InstallationPlane::is_guess);
+        let model = &self.library.models[index];
+        let search = BaseSearch::new(index, model, sight, &self.settings.base_search);
+        let search = search.map(|s| if guessed { s.on_guessed_planes() } else { s });
+        let search = search.map(|s| s.with_min_score(min_score).with_breadth(breadth));
+        search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
     }
 
     /// Fits of candidates, which are sorted by the score of their base. Where a robot is trusted,

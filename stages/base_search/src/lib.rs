@@ -24,5 +24,5 @@ mod trial;
 
 pub use problem::BaseSearch;
 pub use region_evidence::RegionEvidence;
-pub use regions::{guessed_planes, raised_planes, regions, stand_planes};
+pub use regions::{guessed_planes, level_planes, raised_planes, regions, stand_planes};
 pub use settings::{RegionSettings, Settings};

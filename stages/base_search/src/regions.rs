@@ -92,8 +92,10 @@ pub(crate) fn are_stacked(low: &Plane, high: &Plane, n: isize) -> bool {
     low.normal == high.normal && off.abs() < 0.1 * GUESS_STEP
 }
 
-/// Level planes of a box at a range of heights (world frame, metres), every [`GUESS_STEP`].
-fn level_planes(world: &Aabb, heights: Range<f64>) -> Vec<InstallationPlane> {
+/// Level planes of a box at a range of heights (world frame, metres), every 3 cm (`GUESS_STEP`).
+/// Their area is zero: no points support them, and the fit does not keep their height.
+#[must_use]
+pub fn level_planes(world: &Aabb, heights: Range<f64>) -> Vec<InstallationPlane> {
     let Range { start: low, end: high } = heights;
     let n = ((high - low) / GUESS_STEP).ceil().clamp(0.0, MAX_GUESSES) as usize;
     let level = |k: usize| {

@@ -5,6 +5,7 @@ use crate::contact_level::ContactLevel;
 use crate::evidence::{supported_by_others, surface_threshold};
 use crate::obstacle::{HALF_CELL, Obstacle, ObstacleKind};
 use crate::obstacles::{Bin, Obstacles, Replaced};
+use crate::pockets::remove_pockets;
 use crate::shape::{Gap, PartShape};
 use contract::Fan;
 use geometry::{Aabb, Point, Pose};
@@ -136,8 +137,9 @@ impl<'a> RobotBody<'a> {
 
     /// Removes from `around` what belongs to the robot itself in the posture `found`, in which it
     /// was scanned. These are points on or inside its surface, whatever their label, stray points
-    /// beside it, and unseen space that the robot filled. A point beside the robot is a stray point
-    /// if space is known and all its neighbours are points of the robot.
+    /// beside it, and unseen space that the robot filled or left as a small hole. A point beside
+    /// the robot is a stray point if space is known and all its neighbours are points of the
+    /// robot.
     ///
     /// Uncertain points beside the robot count twice: as obstacles [`ObstacleKind::Beside`], and as
     /// points that may be attached to the nearest part and move with it.
@@ -186,6 +188,7 @@ impl<'a> RobotBody<'a> {
             },
             _ => Replaced::Kept,
         });
+        remove_pockets(around);
         for (link, points) in doubtful {
             let part = BodyPart::attached(link, points, self.within);
             self.parts.push(BodyPart { is_doubtful: true, ..part });

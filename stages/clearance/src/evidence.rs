@@ -4,7 +4,9 @@
 //! surface behind it, where nothing is, and masks leave some points of a robot to the fixed world.
 //! A point counts if other points lie on the same surface, or on the same line, as the points of a
 //! wire do. A point without either is dropped if it lies in space that beams passed through. Points
-//! of beams that grazed the edge of a robot count only as part of a surface.
+//! of beams that grazed an edge in front of them count only as part of a surface, or of a line with
+//! little beside it: points of an edge are scattered over the depth behind it, those of a wire that
+//! happens to stand behind the edge are not.
 
 use crate::obstacle::{HALF_CELL, Obstacle, ObstacleKind, distance};
 use contract::{Space, SpaceKind};
@@ -31,12 +33,23 @@ const LINE_REACH: f32 = 0.15;
 const LINE_THICKNESS: f32 = 0.010;
 /// Number of other points that make a line.
 const ON_LINE: usize = 3;
+/// Number of other points that make a line of points of grazing beams, and their least share of all
+/// points about: a curtain behind an edge has points all over.
+const ON_CLEAR_LINE: usize = 8;
+const CLEAR_SHARE: f64 = 0.7;
+/// Number of points, the farthest ones, through which such a line is tried.
+const N_LINES: usize = 4;
+/// Least sine of the angle between such a line and a beam to it: a tip in front leaves a line of
+/// points along the beam. 15°.
+const ACROSS_BEAM: f64 = 0.26;
 /// Largest number of unknown voxels among the six beside that of a point for its surroundings to
 /// count as seen.
 const UNKNOWN: usize = 2;
 
-/// Obstacles by the cube of edge [`NEAR`] that holds them, without those that only grazing beams
-/// measured.
+/// From one obstacle to another, metres.
+type Offset = nalgebra::Vector3<f32>;
+
+/// Obstacles by the cube of edge [`NEAR`] that holds them.
 struct Cubes<'a> {
     all: &'a [Obstacle],
     cubes: FxHashMap<[i32; 3], Vec<u32>>,
@@ -45,9 +58,11 @@ struct Cubes<'a> {
 /// For each obstacle, whether it is evidence of an object. Without `space` nothing is known to be
 /// seen, and all obstacles are. `behind` tells, for those that are no thick surface, which lie
 /// behind something that neighbouring beams hit; these are treated as measured by grazing beams.
+/// `eyes` are the places of the scanners, base frame.
 pub(crate) fn evident(
     all: &mut [Obstacle],
     behind: impl Fn(&[Obstacle], &[bool]) -> Vec<bool>,
+    eyes: &[Point],
     space: Option<&Space>,
     world_from_base: &Pose,
 ) -> Vec<bool> {
@@ -60,11 +75,14 @@ pub(crate) fn evident(
     let surface_threshold = cubes.surface_threshold();
     let is_behind = behind(all, &thin);
     all.iter_mut().zip(is_behind).for_each(|(o, is_behind)| o.is_grazed |= is_behind);
-    let cubes = Cubes::of(all);
+    let (cubes, points) = (Cubes::of(all), Cubes::of_points(all));
     for (at, o) in all.iter().enumerate().filter(|(_, o)| o.is_point()) {
         out[at] = cubes.n_near(o, NEAR, surface_threshold) >= surface_threshold
-            || !o.is_grazed
-                && (cubes.is_small_object(at) || !is_seen(space, &(world_from_base * place(o))));
+            || if o.is_grazed {
+                points.is_on_clear_line(at, eyes)
+            } else {
+                cubes.is_small_object(at) || !is_seen(space, &(world_from_base * place(o)))
+            };
     }
     out
 }
@@ -107,9 +125,19 @@ pub(crate) fn supported_by_others(
 }
 
 impl<'a> Cubes<'a> {
+    /// Of those that not only grazing beams measured.
     fn of(all: &'a [Obstacle]) -> Self {
+        Self::those(all, |o| !o.is_grazed)
+    }
+
+    /// Of all single points.
+    fn of_points(all: &'a [Obstacle]) -> Self {
+        Self::those(all, Obstacle::is_point)
+    }
+
+    fn those(all: &'a [Obstacle], counts: impl Fn(&Obstacle) -> bool) -> Self {
         let mut cubes: FxHashMap<[i32; 3], Vec<u32>> = FxHashMap::default();
-        for (at, o) in all.iter().enumerate().filter(|(_, o)| !o.is_grazed) {
+        for (at, o) in all.iter().enumerate().filter(|(_, o)| counts(o)) {
             cubes.entry(cube(o.at)).or_default().push(at as u32);
         }
         Self { all, cubes }
@@ -156,26 +184,48 @@ impl<'a> Cubes<'a> {
 
     /// Whether enough other obstacles lie on a line through an obstacle.
     fn is_on_line(&self, at: usize) -> bool {
+        let near = self.offsets(at);
+        // Points that are too near define no direction.
+        near.iter()
+            .filter(|v| v.norm() > 2.0 * LINE_THICKNESS)
+            .any(|v| n_along(&near, &v.normalize()) >= ON_LINE)
+    }
+
+    /// Whether most of the obstacles about an obstacle lie on one line through it that does not
+    /// follow a beam.
+    fn is_on_clear_line(&self, at: usize, eyes: &[Point]) -> bool {
+        let mut near = self.offsets(at);
+        let most = (near.len() as f64 * CLEAR_SHARE).ceil() as usize;
+        if near.len() < ON_CLEAR_LINE {
+            return false;
+        }
+        near.sort_by(|a, b| b.norm_squared().total_cmp(&a.norm_squared()));
+        let here = place(&self.all[at]);
+        let is_across = |unit: &Offset| {
+            let unit = unit.map(f64::from);
+            eyes.iter().all(|eye| unit.cross(&(here - eye).normalize()).norm() > ACROSS_BEAM)
+        };
+        near[..N_LINES]
+            .iter()
+            .map(|v| v.normalize())
+            .any(|unit| n_along(&near, &unit) >= most.max(ON_CLEAR_LINE) && is_across(&unit))
+    }
+
+    /// From an obstacle to all others within [`LINE_REACH`], metres.
+    fn offsets(&self, at: usize) -> Vec<Offset> {
         let here = self.all[at].at;
         let reach = (LINE_REACH / NEAR).ceil() as i32;
-        let off =
-            |i: u32| -> [f32; 3] { std::array::from_fn(|k| self.all[i as usize].at[k] - here[k]) };
-        let length = |v: [f32; 3]| v.iter().map(|v| v * v).sum::<f32>().sqrt();
-        let near: Vec<[f32; 3]> = (self.around(here, reach))
+        self.around(here, reach)
             .filter(|i| *i as usize != at)
-            .map(off)
-            .filter(|v| length(*v) < LINE_REACH)
-            .collect();
-        // Points that are too near define no direction.
-        near.iter().filter(|v| length(**v) > 2.0 * LINE_THICKNESS).any(|v| {
-            let unit = v.map(|c| c / length(*v));
-            let across = |w: &&[f32; 3]| {
-                let along = (0..3).map(|k| w[k] * unit[k]).sum::<f32>();
-                length(std::array::from_fn(|k| w[k] - along * unit[k])) < LINE_THICKNESS
-            };
-            near.iter().filter(across).count() >= ON_LINE
-        })
+            .map(|i| Offset::from(std::array::from_fn(|k| self.all[i as usize].at[k] - here[k])))
+            .filter(|v| v.norm() < LINE_REACH)
+            .collect()
     }
+}
+
+/// Number of places near the line through the origin with this direction.
+fn n_along(near: &[Offset], unit: &Offset) -> usize {
+    near.iter().filter(|w| (*w - unit * w.dot(unit)).norm() < LINE_THICKNESS).count()
 }
 
 fn place(o: &Obstacle) -> Point {
@@ -207,6 +257,8 @@ mod tests {
         evident_by(points, kind, false)
     }
 
+    const EYE: [f64; 3] = [-2.0, 0.0, 0.0];
+
     fn evident_by(points: &[[f32; 3]], kind: SpaceKind, grazed: bool) -> Vec<bool> {
         // A distant wall with 1 cm between points sets the density of the scan.
         let wall = (0..2500).map(|i| [1.0, 0.01 * (i % 50) as f32, 0.01 * (i / 50) as f32]);
@@ -220,7 +272,8 @@ mod tests {
         let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
         space.voxels_mut().fill(kind);
         let nothing = |all: &[Obstacle], _: &[bool]| vec![false; all.len()];
-        let out = evident(&mut all, nothing, Some(&space), &Pose::identity());
+        let eyes = [Point::from(EYE)];
+        let out = evident(&mut all, nothing, &eyes, Some(&space), &Pose::identity());
         assert!(out[points.len()..].iter().all(|is| *is), "the wall stands");
         out[..points.len()].to_vec()
     }
@@ -249,6 +302,16 @@ mod tests {
     }
 
     #[test]
+    fn a_wire_that_stands_behind_an_edge_by_chance_stays() {
+        let noise = |i: usize| [0.002, -0.002, 0.001, -0.003][i % 4];
+        let mut all: Vec<[f32; 3]> =
+            (0..60).map(|i| [noise(i), noise(i + 1), 0.01 * i as f32]).collect();
+        // Some points of the edge itself are among them.
+        all.extend((0..5).map(|i| [-0.05 * i as f32, 0.02, 0.1 * i as f32]));
+        assert_eq!(evident_by(&all, SpaceKind::Free, true)[..60], [true; 60]);
+    }
+
+    #[test]
     fn stray_points_are_not_attached() {
         let hose = (0..40).map(|i| ([0.01 * i as f32, 0.0, 0.0], i % 5 == 0));
         let curtain = (0..20).map(|i| ([0.0, 0.3, 0.01 * i as f32], true));
@@ -259,9 +322,14 @@ mod tests {
 
     #[test]
     fn points_of_grazing_beams_count_only_on_surfaces_of_others() {
-        let curtain: Vec<[f32; 3]> = (0..30).map(|i| [0.0, 0.0, 0.01 * i as f32]).collect();
+        // Behind an upright edge, at any depth.
+        let depth = |i: usize| (i * 37 % 50) as f32 * 0.01;
+        let curtain: Vec<[f32; 3]> = (0..30).map(|i| [depth(i), 0.0, 0.01 * i as f32]).collect();
         assert_eq!(evident_by(&curtain, SpaceKind::Free, true), [false; 30]);
         assert_eq!(evident_by(&curtain, SpaceKind::Unknown, true), [false; 30]);
+        // Behind a tip, along the beam.
+        let tail: Vec<[f32; 3]> = (0..30).map(|i| [0.01 * i as f32, 0.0, 0.0]).collect();
+        assert_eq!(evident_by(&tail, SpaceKind::Free, true), [false; 30]);
         // Points at the wall belong to the wall.
         let at_wall = [[0.99, 0.2, 0.2], [1.01, 0.305, 0.1]];
         assert_eq!(evident_by(&at_wall, SpaceKind::Free, true), [true; 2]);

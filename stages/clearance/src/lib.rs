@@ -43,6 +43,7 @@ mod evidence;
 mod obstacle;
 mod obstacles;
 mod path;
+mod pockets;
 mod shadow;
 mod shape;
 

@@ -74,6 +74,8 @@ pub(crate) struct Split {
     offsets: Vec<[f32; 3]>,
     /// Radius of balls that contain a part, metres.
     radius: f32,
+    /// Edge of a voxel, metres.
+    edge: f64,
 }
 
 impl Cells {
@@ -165,7 +167,8 @@ impl Obstacles {
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
         let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, |at| thin[at]);
-        let is_evident = evident(&mut all, behind, space, &known.world_from_base);
+        let eyes: Vec<Point> = cells.fronts.values().map(Front::eye).collect();
+        let is_evident = evident(&mut all, behind, &eyes, space, &known.world_from_base);
         let mut evident = is_evident.into_iter();
         all.retain(|_| evident.next().unwrap_or(true));
         for (number, model, poses) in others {
@@ -294,7 +297,17 @@ impl Split {
             (base_from_world * by).map(|v| v as f32).into()
         };
         let offsets = (0..PARTS.pow(3)).map(middle).collect();
-        Self { offsets, radius: (HALF_DIAGONAL * step) as f32 }
+        Self { offsets, radius: (HALF_DIAGONAL * step) as f32, edge }
+    }
+
+    /// Edge of a voxel and radius of the ball of a part, metres; `None` without known space.
+    pub(crate) fn sizes(&self) -> Option<(f64, f32)> {
+        (!self.is_empty()).then_some((self.edge, self.radius))
+    }
+
+    /// Edge of a part, metres.
+    pub(crate) fn step(&self) -> f64 {
+        self.edge / PARTS as f64
     }
 
     /// Whether there is no known space.

@@ -122,6 +122,11 @@ impl Front {
         Self { eye: eye.at, width: eye.step.max(BEAM), near: FxHashMap::default() }
     }
 
+    /// Place of the scanner, base frame, metres.
+    pub(crate) fn eye(&self) -> Point {
+        self.eye
+    }
+
     pub(crate) fn add(&mut self, p: &Point) {
         let (cell, far) = self.cell(p);
         let near = self.near.entry(cell).or_insert(far);

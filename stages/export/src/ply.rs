@@ -2,7 +2,7 @@
 //! viewers and libraries that do not read LAS (Open3D, MeshLab).
 
 use crate::atomic::AtomicFile;
-use crate::refill::KINDS;
+use crate::refill::{KINDS, decoded};
 use contract::{Error, Kind, PointKind, Result};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -36,7 +36,8 @@ pub fn write_ply(
             .at(tile.display())
             .hint("`stillpoint verify` checks whether the result is complete")
     };
-    let open = |tile: &Path| las::Reader::from_path(tile).map_err(|e| bad(e, tile));
+    let open =
+        |tile: &Path| decoded(tile, || las::Reader::from_path(tile))?.map_err(|e| bad(e, tile));
     // All tiles of a result have the same record format.
     let has_color = open(&tiles[0])?.header().point_format().has_color;
     let [moving, fixed] = PLY.map(|name| Ply::create(&into.join(name), has_color));
@@ -46,7 +47,7 @@ pub fn write_ply(
         let bad = |e| bad(e, tile);
         let mut reader = open(tile)?;
         let mut piece = las::PointDataBuilder::new().for_header(reader.header()).build();
-        while reader.fill_points(PIECE, &mut piece).map_err(bad)? > 0 {
+        while decoded(tile, || reader.fill_points(PIECE, &mut piece))?.map_err(bad)? > 0 {
             for point in points(&piece) {
                 let moves = matches!(point.kind, PointKind::Link | PointKind::Attachment);
                 if moves { &mut moving } else { &mut fixed }.add(&point)?;

@@ -6,7 +6,7 @@ use crate::chunks;
 use crate::las::head;
 use crate::record::{CLASSES, LasSettings, RecordExtent};
 use crate::spool::{Blocks, Spool};
-use contract::{Error, Label, PointKind, Result};
+use contract::{Error, Label, PointKind, Result, fence};
 use las::raw;
 use laz::LasZipDecompressor;
 use std::fs::File;
@@ -197,7 +197,8 @@ impl<'a> RefillTile<'a> {
             let fits = chunks::check(&mut file, at, &laz, las, left).map_err(failed)?;
             fits.map_err(|what| foreign().because(what))?;
             file.seek(SeekFrom::Start(at)).map_err(failed)?;
-            let reader = LasZipDecompressor::new(file, laz).map_err(|e| foreign().because(e))?;
+            let reader = decoded(path, || LasZipDecompressor::new(file, laz))?;
+            let reader = reader.map_err(|e| foreign().because(e))?;
             RefillRecords::Compressed(Box::new(reader))
         } else {
             if let Some(stated) = stated {
@@ -228,7 +229,9 @@ impl<'a> RefillTile<'a> {
         let read = match &mut self.records {
             RefillRecords::None => Ok(()),
             RefillRecords::Plain(file) => file.read_exact(bytes),
-            RefillRecords::Compressed(reader) => reader.decompress_many(bytes),
+            RefillRecords::Compressed(reader) => {
+                decoded(self.path, || reader.decompress_many(bytes))?
+            }
         };
         read.map_err(|e| Error::of_read("tile cannot be read", self.path, e))?;
         if let Some((_, read)) = &mut self.sum {
@@ -238,6 +241,19 @@ impl<'a> RefillTile<'a> {
         self.left -= n;
         Ok(Some(bytes))
     }
+}
+
+/// The outcome of a decoder, which may panic where the bytes of a tile were changed.
+///
+/// # Errors
+/// If it panics.
+pub(crate) fn decoded<T>(tile: &Path, decode: impl FnOnce() -> T) -> Result<T> {
+    fence::fenced(decode).map_err(|panic| {
+        Error::bad_input("tile cannot be decoded")
+            .because(panic)
+            .at(tile.display())
+            .hint("`stillpoint verify` names all files that are wrong; run the same job again")
+    })
 }
 
 /// Length and checksum of a whole file.
@@ -262,4 +278,19 @@ fn compare(path: &Path, stated: StatedTile, read: StatedTile) -> Result<()> {
     Err(Error::bad_input("its bytes are not those that were written")
         .at(path.display())
         .hint("`stillpoint verify` names all files that are wrong; run the same job again"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decoder_that_panics_is_an_error_of_its_tile() {
+        let broken = decoded(Path::new("tiles/0_0.laz"), || -> u8 { panic!("index out of range") });
+        let said = broken.expect_err("it panics");
+        assert_eq!(said.kind(), contract::Kind::BadInput);
+        let said = said.to_string();
+        assert!(said.contains("0_0.laz") && said.contains("index out of range"), "{said}");
+        assert_eq!(decoded(Path::new("tiles/0_0.laz"), || 7).ok(), Some(7));
+    }
 }

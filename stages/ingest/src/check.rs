@@ -1,7 +1,7 @@
 //! Helpers for tests: read files whole, keep places and world coordinates, and damage copies.
 
-use crate::Settings;
 use crate::reader::{self, Reader, Want};
+use crate::settings::Settings;
 use contract::{Attributes, Result};
 use geometry::Point;
 use rand::Rng;

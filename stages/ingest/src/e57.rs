@@ -2,6 +2,7 @@
 //! `e57`; the points are decoded here.
 
 mod describe;
+mod file;
 mod look;
 mod packets;
 mod pages;
@@ -10,35 +11,23 @@ mod scan;
 mod stream;
 mod strips;
 
-use crate::Settings;
 use crate::oddities::Oddities;
 use crate::reader::{FileReading, MaskSeed, RawStrips, Reader, SampledPoint, ScanSeed, Want};
+use crate::settings::Settings;
 use crate::units::{self, Choice, Units};
 use ::e57::E57Reader;
 use contract::{Error, Format, Kind, Result, XmlLimits, check_xml};
+use file::E57File;
 use pages::{PAGE, Pages};
 use scan::E57Scan;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Number of bytes of the description that are read at a time: the most that [`Pages::read`] gives.
 const AT_ONCE: usize = 64 << 10;
 /// Length of the file header, bytes.
 const HEADER: usize = 48;
-
-/// An open E57 file.
-struct E57File {
-    path: PathBuf,
-    settings: Settings,
-    masks: Vec<MaskSeed>,
-    scans: Vec<ScanSeed>,
-    files: Vec<E57Scan>,
-    /// Counts of odd points, one entry a scan.
-    oddities: Vec<Oddities>,
-    facts: Vec<(String, String)>,
-    units: Units,
-}
 
 /// Opens an E57 file: header, description and the first points of each scan are read and checked.
 pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> {

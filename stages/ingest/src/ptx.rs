@@ -3,54 +3,19 @@
 //! column by column.
 
 mod blocks;
+mod file;
 mod look;
 mod strips;
 #[cfg(test)]
 mod tests;
 
-use crate::Settings;
-use crate::frame::FileFrame;
-use crate::levels::Span;
 use crate::oddities::Oddities;
 use crate::reader::{FileReading, MaskSeed, Reader, SampledPoint, ScanSeed, Want};
+use crate::settings::Settings;
 use crate::units::{Choice, Units};
 use contract::{Format, Result};
-use std::path::{Path, PathBuf};
-
-/// One scan of the file.
-#[derive(Debug, Clone)]
-struct PtxScan {
-    /// Number of rows.
-    n_rows: u64,
-    /// Number of lines of points.
-    n_lines: u64,
-    /// Number of values of a line.
-    n_columns: usize,
-    /// Number of lines that are not `0 0 0`.
-    n_valid: u64,
-    /// Byte offset of the points, and number of the line before.
-    points_at: (u64, u64),
-    /// Metres per unit of the file.
-    metres: f64,
-    /// Conversion from the file's coordinates (metres) to the scan frame.
-    frame: FileFrame,
-    /// The intensities that become 0 and 65535.
-    intensity: Span,
-    /// The step of the coordinates, metres; `None` where it is fine enough.
-    step: Option<f64>,
-}
-
-/// An open PTX file.
-struct PtxFile {
-    path: PathBuf,
-    settings: Settings,
-    masks: Vec<MaskSeed>,
-    scans: Vec<ScanSeed>,
-    blocks: Vec<PtxScan>,
-    units: Units,
-    /// Counts of odd points, one entry a scan.
-    oddities: Vec<Oddities>,
-}
+use file::PtxFile;
+use std::path::Path;
 
 /// Opens a PTX file. All lines are counted, since only so the scans after the first can be found.
 pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> {

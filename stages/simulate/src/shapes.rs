@@ -21,6 +21,8 @@ pub struct BodyShape {
     pub robot: Option<usize>,
     /// Index of the link with which it moves rigidly; `None` for hoses, which bend.
     pub link: Option<usize>,
+    /// Whether it belongs to the robot's model, and not to what the robot carries.
+    pub is_of_model: bool,
     /// Triangles in the world without the scene's origin, metres.
     pub triangles: Vec<[[f32; 3]; 3]>,
 }
@@ -53,6 +55,7 @@ impl Shapes {
                 }
                 _ => index(surface.holder),
             },
+            is_of_model: surface.label.robot >= 0 && surface.label.link >= 0,
             triangles: Vec::new(),
         };
         let mut all: Vec<BodyShape> = world.surfaces.iter().map(shape).collect();

@@ -1,6 +1,7 @@
 //! `bench check`: scans random cells, runs the main job and checks paths of their robots. Meshes
 //! tell whether a path collides; the table counts false alarms and misses by reason.
 
+mod bodies;
 mod draw;
 mod row;
 mod table;

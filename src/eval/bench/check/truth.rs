@@ -1,70 +1,48 @@
 //! True distances of a path, computed from meshes alone: how near a robot comes to other bodies,
 //! and whether scanners could see the space that it passes.
 
-use contract::{Result, SpaceGrid};
-use geometry::{Aabb, Point, Pose};
+use super::bodies::{MeshPart, OWN_SAMPLE, OwnVolume, hose_pieces, pieces, places};
+use contract::Result;
+use geometry::{Point, Pose};
 use glamx::Vec3;
-use nalgebra::Point3;
 use parry3d::partitioning::BvhNode;
 use parry3d::query;
 use parry3d::shape::{TriMesh, Triangle};
 use robot::Model;
 use simulate::{BodyShape, Scene, Shapes};
 use std::cell::Cell;
-use std::collections::BTreeMap;
 
 /// Greatest distance that is computed, metres.
 pub(super) const FAR: f64 = 0.1;
 /// Search radius beyond the nearest obstacle of each part, metres: the part need not be examined
 /// again until it has moved by as much.
 const AHEAD: f64 = 0.03;
-/// Greatest side of triangles of obstacles within reach, metres.
-const SHORT: f32 = 0.2;
 /// Distance below which bodies touch, metres: rounding of single precision in a hall.
 pub(super) const TOUCH: f64 = 5e-4;
 /// Greatest motion of any point between two examined postures near an obstacle, metres.
 const STEP: f64 = 2e-3;
-/// Spacing of positions that are examined for visibility, metres; finer than the eighths of voxels
-/// of known space.
-const SAMPLE: f64 = 0.02;
 /// Distance within which a seen position makes another one seen, metres: half an eighth of a voxel
 /// of known space.
 const SEEN_BESIDE: f64 = 0.0125;
 /// Motion between postures that are examined for visibility, metres.
 const SEEN_STEP: f64 = 0.02;
-/// Edge of the voxels that mark the scanned robot's own volume, and spacing of the positions that
-/// mark them, metres.
-const OWN_EDGE: f64 = 0.02;
-const OWN_SAMPLE: f64 = 0.008;
 /// Range of the virtual scanners, metres.
 const RANGE: f64 = 80.0;
-
-/// A body that moves with a link, in its frame.
-struct MeshPart {
-    link: usize,
-    mesh: TriMesh,
-    bounds: Aabb,
-    /// Places on its surface, and outward normals.
-    samples: Vec<(Point, geometry::Vector)>,
-    /// The obstacle triangle that was nearest last: it is probably near in the next posture, too,
-    /// which saves most others.
-    last: Cell<Option<u32>>,
-    /// Lower bound of its distance at the last examination, and its bounds then.
-    kept: Cell<Option<(f64, [Point; 8])>>,
-}
 
 /// A robot of a scene among all else.
 pub(super) struct PathTruth<'a> {
     model: &'a Model,
     world_from_base: Pose,
     parts: Vec<MeshPart>,
+    /// Pieces of its hoses, each with the link that is nearest to it.
+    hoses: Vec<MeshPart>,
     standing: TriMesh,
     /// Index of the shape of each triangle of what stands.
     of: Vec<u32>,
     shapes: &'a Shapes,
     /// Where scanners stand, with their elevations, radians.
     scanners: Vec<(Point, [f64; 2])>,
-    own: (SpaceGrid, Vec<bool>),
+    own: OwnVolume,
 }
 
 /// How near a path comes to something.
@@ -93,10 +71,13 @@ impl<'a> PathTruth<'a> {
         let poses = placed(model, &world_from_base, posture);
         let moves = model.moving();
         let is_own = |s: &&BodyShape| s.robot == Some(robot);
-        let own = shapes.all.iter().filter(is_own).filter_map(|s| Some((s.link?, s)));
-        let parts = own.clone().filter(|(link, _)| moves[*link]);
+        let own = shapes.all.iter().filter(is_own);
+        let parts = own.clone().filter_map(|s| Some((s.link?, s)));
+        let parts = parts.filter(|(link, _)| moves[*link]);
         let parts: Vec<MeshPart> =
             parts.filter_map(|(link, shape)| MeshPart::of(link, shape, &poses[link])).collect();
+        let hoses = own.clone().filter(|s| s.link.is_none());
+        let hoses = hoses.flat_map(|hose| hose_pieces(hose, &parts, &poses)).collect();
         let foot = world_from_base.translation.vector.map(|v| v as f32);
         let (foot, reach) = (Vec3::from_array(foot.into()), clearance::reach(model) as f32 + 0.5);
         let (mut corners, mut triangles, mut of) = (Vec::new(), Vec::new(), Vec::new());
@@ -116,9 +97,21 @@ impl<'a> PathTruth<'a> {
             let dome = s.raster.elevation_deg.map(f64::to_radians);
             (Point::from(s.position), dome)
         });
-        let own = filled(own.map(|(_, shape)| shape));
-        let scanners = scanners.collect();
-        Ok(Self { model, world_from_base, parts, standing, of, shapes, scanners, own })
+        let (scanners, volume) = (scanners.collect(), OwnVolume::of_bodies(own.clone()));
+        let mut out = Self {
+            model,
+            world_from_base,
+            parts,
+            hoses,
+            standing,
+            of,
+            shapes,
+            scanners,
+            own: volume,
+        };
+        let carried = own.filter(|s| !s.is_of_model && s.link.is_some());
+        out.fill_seen(carried);
+        Ok(out)
     }
 
     /// How near a posture is to something, no farther than [`FAR`], metres.
@@ -199,9 +192,23 @@ impl<'a> PathTruth<'a> {
         best
     }
 
-    /// Whether scanners saw all space that the links which move on a path go through, and so far
-    /// around them, metres, but for what the robot filled itself as it was scanned: a beam can go
-    /// there, and ends on something.
+    /// Fills the voxels of those surfaces that scanners see: nobody knows how deep a part is that
+    /// a robot carries.
+    fn fill_seen<'s>(&mut self, shapes: impl Iterator<Item = &'s BodyShape>) {
+        let mut seen = Vec::new();
+        for t in shapes.flat_map(|s| &s.triangles) {
+            places(&t.map(Vec3::from_array), OWN_SAMPLE, |p| {
+                seen.extend(self.is_reached(&p).then_some(p));
+            });
+        }
+        for at in seen.iter().filter_map(|p| self.own.grid.index(p.coords.into())) {
+            self.own.filled[at] = true;
+        }
+    }
+
+    /// Whether scanners saw all space that whatever moves on a path goes through, links, hoses and
+    /// carried parts, and so far around it, metres, but for what the robot filled itself as it was
+    /// scanned: a beam can go there, and ends on something.
     pub(super) fn is_seen(&self, from: &[f64], to: &[f64], around: f64) -> bool {
         let n = self.n_steps(from, to, SEEN_STEP);
         let ends = [from, to].map(|at| placed(self.model, &self.world_from_base, at));
@@ -209,7 +216,7 @@ impl<'a> PathTruth<'a> {
             let [a, b] = [0, 1].map(|end| ends[end][part.link].to_homogeneous());
             (a - b).amax() > 1e-9
         };
-        let moving: Vec<&MeshPart> = self.parts.iter().filter(moves).collect();
+        let moving: Vec<&MeshPart> = self.parts.iter().chain(&self.hoses).filter(moves).collect();
         (0..=n).all(|step| {
             let posture = between(from, to, step as f64 / n as f64);
             let poses = placed(self.model, &self.world_from_base, &posture);
@@ -235,10 +242,12 @@ impl<'a> PathTruth<'a> {
     }
 
     fn is_seen_at(&self, p: &Point) -> bool {
-        let (grid, filled) = &self.own;
-        if grid.index(p.coords.into()).is_some_and(|at| filled[at]) {
-            return true;
-        }
+        let OwnVolume { grid, filled } = &self.own;
+        grid.index(p.coords.into()).is_some_and(|at| filled[at]) || self.is_reached(p)
+    }
+
+    /// Whether a scanner's beam can go to the position, and ends on something.
+    fn is_reached(&self, p: &Point) -> bool {
         self.scanners.iter().any(|(eye, dome)| {
             let way = p - eye;
             let rise = way.z.atan2(way.xy().norm());
@@ -263,85 +272,6 @@ impl<'a> PathTruth<'a> {
         let ways = all.windows(2).flat_map(|w| w[0].iter().zip(&w[1]).map(|(a, b)| (b - a).norm()));
         let longest = ways.fold(0.0, f64::max);
         ((longest * COARSE as f64 / most).ceil() as usize).max(1)
-    }
-}
-
-impl MeshPart {
-    /// Lower bound of its distance with these bounds: no point of it has moved farther than the
-    /// corners of its bounds.
-    fn keeps(&self, corners: &[Point; 8]) -> f64 {
-        let Some((kept, before)) = self.kept.get() else { return 0.0 };
-        let ways = before.iter().zip(corners).map(|(a, b)| (b - a).norm());
-        kept - ways.fold(0.0, f64::max)
-    }
-
-    fn of(link: usize, shape: &BodyShape, world_from_link: &Pose) -> Option<Self> {
-        let link_from_world = world_from_link.inverse();
-        let inner = |p: &[f32; 3]| {
-            (link_from_world * Point::from(p.map(f64::from))).coords.map(|v| v as f32)
-        };
-        let corners: Vec<Vec3> =
-            shape.triangles.iter().flatten().map(|p| Vec3::from_array(inner(p).into())).collect();
-        let bounds = Aabb::of(corners.iter().map(|p| p.to_array().map(f64::from)));
-        let triangles: Vec<[u32; 3]> =
-            (0..shape.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let thin = |p: &Point| [p.x, p.y, p.z].map(|v| (v / SAMPLE).floor() as i32);
-        let mut samples = BTreeMap::new();
-        for t in corners.chunks_exact(3) {
-            let normal = (t[1] - t[0]).cross(t[2] - t[0]).normalize_or_zero().to_array();
-            let normal = geometry::Vector::from(normal.map(f64::from));
-            places(&[t[0], t[1], t[2]], 0.5 * SAMPLE, |p| {
-                samples.entry(thin(&p)).or_insert((p, normal));
-            });
-        }
-        let samples = samples.into_values().collect();
-        let mesh = TriMesh::new(corners, triangles).ok()?;
-        Some(Self { link, mesh, bounds, samples, last: Cell::new(None), kept: Cell::new(None) })
-    }
-}
-
-/// Voxels of bodies: their surfaces and enclosed volumes.
-fn filled<'s>(shapes: impl Iterator<Item = &'s BodyShape>) -> (SpaceGrid, Vec<bool>) {
-    let mut all = Vec::new();
-    for t in shapes.flat_map(|s| &s.triangles) {
-        places(&t.map(Vec3::from_array), OWN_SAMPLE, |p| all.push(p));
-    }
-    let bounds = Aabb::of(all.iter().map(|p| p.coords.into()));
-    let grid = SpaceGrid::over(&bounds.grown(2.0 * OWN_EDGE), OWN_EDGE);
-    let mut filled = vec![false; grid.size.iter().product()];
-    let surface: Vec<usize> = all.iter().filter_map(|p| grid.index(p.coords.into())).collect();
-    surface.iter().for_each(|at| filled[*at] = true);
-    grid.enclosed(&bounds, &surface).into_iter().for_each(|at| filled[at] = true);
-    (grid, filled)
-}
-
-/// Divides a triangle into pieces that are small within reach: bounding boxes of long oblique
-/// triangles contain much that is far from them.
-fn pieces([a, b, c]: [Vec3; 3], near: Vec3, within: f32, take: &mut impl FnMut([Vec3; 3])) {
-    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-    let off = (low - near).max(near - high).max(Vec3::ZERO).length();
-    let lengths = [(b - a).length(), (c - b).length(), (a - c).length()];
-    let longest = (0..3).max_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
-    if lengths[longest] <= SHORT || off > within {
-        return take([a, b, c]);
-    }
-    // Across its longest side.
-    let [a, b, c] = [[a, b, c], [b, c, a], [c, a, b]][longest];
-    let middle = (a + b) * 0.5;
-    pieces([a, middle, c], near, within, take);
-    pieces([middle, b, c], near, within, take);
-}
-
-/// Places on a triangle, about so far apart, metres.
-fn places([a, b, c]: &[Vec3; 3], apart: f64, mut take: impl FnMut(Point)) {
-    let longest = (*b - *a).length().max((*c - *a).length()).max((*c - *b).length());
-    let n = (f64::from(longest) / apart).ceil().max(1.0) as usize;
-    for i in 0..=n {
-        for j in 0..=n - i {
-            let (u, v) = (i as f32 / n as f32, j as f32 / n as f32);
-            let p = *a + (*b - *a) * u + (*c - *a) * v;
-            take(Point3::from(p.to_array().map(f64::from)));
-        }
     }
 }
 

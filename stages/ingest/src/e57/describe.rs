@@ -3,10 +3,10 @@
 
 use super::look::E57Look;
 use super::scan::{Coordinates, E57Scan};
-use crate::Settings;
 use crate::frame::{self, FileFrame};
 use crate::oddities::no_returns_note;
 use crate::reader::ScanSeed;
+use crate::settings::Settings;
 use contract::{Error, Kind, Result};
 use e57::PointCloud;
 use geometry::{Aabb, Point, Pose};

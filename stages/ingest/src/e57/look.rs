@@ -4,8 +4,8 @@
 use super::pages::Pages;
 use super::points::{E57Points, WantedFields};
 use super::scan::E57Scan;
-use crate::Settings;
 use crate::frame::NO_RETURN;
+use crate::settings::Settings;
 use contract::Result;
 use std::path::Path;
 

@@ -1,12 +1,12 @@
 //! Strips of an E57 file in file order, from the blocks of points of all its scans.
 
-use super::E57File;
+use super::file::E57File;
 use super::pages::Pages;
 use super::points::{E57Points, WantedFields};
 use super::scan::E57Scan;
-use crate::Settings;
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, SampledPoint, Want};
+use crate::settings::Settings;
 use contract::{Attributes, Result};
 use geometry::Point;
 

@@ -1,6 +1,6 @@
 //! Finds the blocks of a PTX file: their offsets, poses and numbers of points. No point is kept.
 
-use super::PtxScan;
+use super::file::PtxScan;
 use super::look::PtxLook;
 use crate::frame::{self, FileFrame};
 use crate::oddities::no_returns_note;

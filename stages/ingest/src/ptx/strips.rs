@@ -1,6 +1,7 @@
 //! Strips of a PTX file in file order, from the lines of all its blocks.
 
-use super::{PtxFile, PtxScan, blocks};
+use super::blocks;
+use super::file::{PtxFile, PtxScan};
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, SampledPoint, Want};
 use crate::text::{TextLines, numbers};

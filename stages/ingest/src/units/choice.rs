@@ -1,6 +1,7 @@
 //! Parses the units that a user gives with `--units`, such as `mm` or `hall.las=us-ft`.
 
-use super::{LengthUnit, known};
+use super::known;
+use super::length_unit::LengthUnit;
 use contract::{Error, Kind, Result};
 use std::path::Path;
 

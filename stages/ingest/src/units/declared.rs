@@ -1,6 +1,7 @@
 //! What a file declares about the units of its coordinates, before it is interpreted.
 
-use super::{LengthUnit, known};
+use super::known;
+use super::length_unit::{LengthUnit, is_same};
 
 /// The kind of a coordinate system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,10 +49,6 @@ pub(crate) enum Sense {
     Nothing(String),
 }
 
-/// Largest relative difference of two units that are the same: rounding, and the two kinds of foot
-/// (2e-6).
-const SAME: f64 = 1e-3;
-
 /// Largest number of characters of a unit's name that are kept.
 const LONGEST_NAME: usize = 60;
 
@@ -94,9 +91,4 @@ impl StatedUnit {
             (None, None) => Sense::Nothing(cut),
         }
     }
-}
-
-/// Whether two units, in metres, are the same.
-pub(crate) fn is_same(a: f64, b: f64) -> bool {
-    (a / b - 1.0).abs() < SAME
 }

@@ -65,8 +65,12 @@ pub(crate) fn read(directory: &[u8], doubles: &[u8]) -> Option<Declaration> {
 
 /// The message where the key of the unit and the system differ; the key counts, as in other
 /// readers.
-fn contradiction(name: &str, metres: f64, system: Option<super::LengthUnit>) -> Option<String> {
-    let system = system.filter(|unit| !super::declared::is_same(unit.metres, metres))?;
+fn contradiction(
+    name: &str,
+    metres: f64,
+    system: Option<super::length_unit::LengthUnit>,
+) -> Option<String> {
+    let system = system.filter(|unit| !super::length_unit::is_same(unit.metres, metres))?;
     Some(format!(
         "the GeoTIFF keys name a system in {} and the unit {name}: the unit counts",
         system.name

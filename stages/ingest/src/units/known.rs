@@ -1,7 +1,7 @@
 //! The length in metres of units by name or EPSG code. Units by code, and systems that are not in
 //! metres, come from the EPSG registry (`epsg.txt`).
 
-use super::LengthUnit;
+use super::length_unit::LengthUnit;
 
 /// The relevant part of the EPSG registry; its first lines say how it was made.
 const EPSG: &str = include_str!("epsg.txt");

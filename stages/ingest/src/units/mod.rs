@@ -6,6 +6,7 @@ mod declared;
 mod geokeys;
 mod known;
 mod las;
+mod length_unit;
 mod projjson;
 mod wkt;
 
@@ -15,21 +16,14 @@ mod tests;
 pub(crate) use choice::{Choice, DECLARED};
 pub(crate) use declared::Declaration;
 pub(crate) use las::read as of_las;
+pub use length_unit::LengthUnit;
 pub(crate) use wkt::read as of_wkt;
 
 use contract::{Error, Kind, Result, quote};
-use declared::{Sense, StatedUnit, System, is_same};
+use declared::{Sense, StatedUnit, System};
+use length_unit::is_same;
 use serde::Serialize;
 use std::fmt;
-
-/// A unit of length.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LengthUnit {
-    /// Display name.
-    pub name: String,
-    /// Length of one unit, metres.
-    pub metres: f64,
-}
 
 /// Source of the units of an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -64,17 +58,6 @@ pub struct Units {
 
 /// Advice for files whose units cannot be determined.
 const WAY_OUT: &str = "give the unit with --units, for example --units m";
-
-impl LengthUnit {
-    pub(crate) fn new(name: impl Into<String>, metres: f64) -> Self {
-        Self { name: name.into(), metres }
-    }
-
-    /// Whether the unit is about `metres` long.
-    pub(crate) fn is_about(&self, metres: f64) -> bool {
-        is_same(self.metres, metres)
-    }
-}
 
 impl Units {
     /// The units of a file with these declarations, the decisive one first; `choice` is what the
@@ -240,15 +223,6 @@ fn disagreement(declared: &[Declaration], horizontal: Option<&LengthUnit>) -> Op
     });
     let (unit, by) = other?;
     Some(format!("its {by} declares another unit, which does not count: {unit}"))
-}
-
-impl fmt::Display for LengthUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.name.as_str() {
-            "metre" if is_same(self.metres, 1.0) => write!(f, "metre"),
-            name => write!(f, "{} ({} m)", quote::shown(name), (self.metres * 1e9).round() / 1e9),
-        }
-    }
 }
 
 impl fmt::Display for Units {
