@@ -112,12 +112,22 @@ impl NameRule {
                 if is_reserved { format!("n{out}") } else { out }
             }
             Self::Usd => {
-                let fits = |c: char| c.is_alphanumeric() && (c.is_ascii() || c.is_alphabetic());
-                let out: String = name.chars().map(|c| if fits(c) { c } else { '_' }).collect();
-                let needs = out.starts_with(|c: char| c.is_numeric());
-                if needs { format!("_{out}") } else { out }
+                let out: String = name.chars().map(|c| if is_usd(c) { c } else { '_' }).collect();
+                if out.starts_with(|c: char| c.is_ascii_digit()) { format!("_{out}") } else { out }
             }
         }
+    }
+}
+
+/// Whether a USD name may hold a character: ASCII, and letters of the scripts that robots are named
+/// in. Which others a reader accepts depends on the Unicode of its version.
+fn is_usd(c: char) -> bool {
+    match c {
+        _ if c.is_ascii() => c.is_ascii_alphanumeric() || c == '_',
+        '\u{c0}'..='\u{24f}' | '\u{388}'..='\u{481}' | '\u{48a}'..='\u{52f}' => c.is_alphabetic(),
+        '\u{3041}'..='\u{3096}' | '\u{30a1}'..='\u{30fa}' => true,
+        '\u{4e00}'..='\u{9fff}' | '\u{ac00}'..='\u{d7a3}' => true,
+        _ => false,
     }
 }
 
@@ -134,6 +144,8 @@ mod tests {
         assert_eq!(add(2, "2a"), "_2a", "digits are kept");
         assert_eq!(add(3, "Ünï-x"), "Ünï_x");
         assert_eq!(add(4, "Ünï.x"), "Ünï_x_2");
+        assert_eq!(add(5, "手1"), "手1");
+        assert_eq!(add(6, "ⓐb"), "_b", "letters in circles are none in USD");
         assert_eq!(names.add(Named::Joint, 0, 0, "R1", "base_link"), "base_link_2");
         assert_eq!(names.add(Named::Link, 1, 0, "R2", "base_link"), "base_link");
         let mut names = NameMap::new(NameRule::Sdf);
