@@ -14,16 +14,30 @@ def shape(station, name, file, pose, frame):
     return item
 
 
+def robot_of_station(station, robot_id, taken):
+    """The robot of the station for one of the plant, or None. Where no name is the same RoboDK gives the closest one."""
+    wanted = STATION_NAMES.get(robot_id)
+    item = station.Item(wanted, robolink.ITEM_TYPE_ROBOT) if wanted else None
+    if wanted in taken:
+        why = f"{wanted!r} of the station is {taken[wanted]}; give this one another name in STATION_NAMES"
+    elif item is None or not item.Valid() or item.Name() != wanted:
+        why = f"the station has no robot {wanted!r}"
+    else:
+        taken[wanted] = robot_id
+        return item
+    print(f"{robot_id}: {why}; its links are shown as they stand")
+    return None
+
+
 def main():
     station = robolink.Robolink()
     world = station.AddFrame("Plant")
     for name, file, pose in FIXED:
         shape(station, name, file, pose, world)
+    taken = {}
     for robot_id, robot in ROBOTS.items():
-        wanted = STATION_NAMES.get(robot_id)
-        item = station.Item(wanted, robolink.ITEM_TYPE_ROBOT) if wanted else None
-        if item is None or not item.Valid():
-            print(f"{robot_id}: the station has no robot {wanted!r}; its links are shown as they stand")
+        item = robot_of_station(station, robot_id, taken)
+        if item is None:
             frame = station.AddFrame(robot_id, world)
             for name, file, pose in LINKS[robot_id]:
                 shape(station, f"{robot_id}/{name}", file, pose, frame)
