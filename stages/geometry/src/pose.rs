@@ -11,8 +11,8 @@ pub type Point = nalgebra::Point3<f64>;
 pub type Vector = nalgebra::Vector3<f64>;
 
 /// Roll, pitch and yaw as URDF has them, `Rz(yaw) · Ry(pitch) · Rx(roll)`, radians. They give the
-/// turn back at a pitch of a quarter turn as well, where `euler_angles` of `nalgebra` takes roll and
-/// yaw from what is left of rounding.
+/// turn back at a pitch of a quarter turn as well, where angles of a matrix take roll and yaw from
+/// what is left of rounding.
 #[must_use]
 pub fn roll_pitch_yaw(turn: &UnitQuaternion<f64>) -> [f64; 3] {
     let (w, x, y, z) = (turn.w, turn.i, turn.j, turn.k);
