@@ -139,7 +139,9 @@ impl ModelDetails {
         out.links.extend(tool.links.iter().cloned());
         out.joints.push(JointDetails::default());
         out.joints.extend(tool.joints.iter().cloned());
-        out.extras.extend(tool.extras.iter().cloned());
+        // Tools may have names of their robot: elements know links and joints by number.
+        let (links, joints) = (self.links.len(), self.joints.len() + 1);
+        out.extras.extend(tool.extras.iter().map(|extra| extra.behind(links, joints)));
         out
     }
 
@@ -167,7 +169,7 @@ impl ModelDetails {
                 *own = joint(node);
             }
         }
-        self.extras.extend(extras::of(root));
+        self.extras.extend(extras::of(root, model));
     }
 }
 
@@ -303,11 +305,34 @@ mod tests {
             (Some(0.7), Some(0.2), Some(0.5))
         );
         assert_eq!(joint.safety.expect("is stated").soft_upper, 1.9);
-        let text = |at: usize| details.extras[at].text(&|_, name| name.to_owned());
+        let link = |at: usize| model.links[at].name.as_str();
+        let joint = |at: usize| model.joints[at].name.as_str();
+        let text = |at: usize| details.extras[at].text(&link, &joint);
         assert_eq!(
             text(0),
             "<transmission name=\"t\"><joint name=\"shoulder\"><i>a &amp; b</i></joint></transmission>"
         );
+        assert!(text(1).starts_with("<gazebo reference=\"arm\">"));
         assert!(text(1).contains("<x:mu1 xmlns:x=\"http://x.org\">0.2</x:mu1>"), "{}", text(1));
+    }
+
+    #[test]
+    fn elements_of_a_tool_mean_its_own_links_and_joints() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("robot.urdf"), URDF).expect("writes");
+        let settings = Settings::without_clouds();
+        let (model, _) = Model::load(folder.path(), &settings).expect("loads");
+        let details = ModelDetails::load(folder.path(), &model, &settings).expect("loads");
+        // The tool has the names of its robot.
+        let dressed = model.with_tool(&model, 1, 0.0);
+        let both = details.with_tool(&details);
+        assert_eq!((both.links.len(), both.joints.len()), (4, 3));
+        let link = |at: usize| ["base", "arm", "base_2", "arm_2"][at];
+        let joint = |at: usize| dressed.joints[at].name.as_str();
+        let text = |at: usize| both.extras[at].text(&link, &joint);
+        assert!(text(0).contains("<joint name=\"shoulder\">"), "{}", text(0));
+        assert!(text(1).contains("reference=\"arm\""), "{}", text(1));
+        assert!(text(2).contains("/shoulder\">"), "{}", text(2));
+        assert!(text(3).contains("reference=\"arm_2\""), "{}", text(3));
     }
 }

@@ -54,7 +54,7 @@ mod urdf;
 pub use closed_loop::{ClosedLoop, Closure, Form};
 pub use correct::correct;
 pub use details::{Inertial, JointDetails, LinkDetails, ModelDetails, SafetyLimits};
-pub use extras::{ExtraNode, UrdfExtra};
+pub use extras::{ExtraNode, ExtraValue, UrdfExtra};
 pub use finding::{Finding, Severity};
 pub use hull::hull;
 pub use library::Library;

@@ -9,11 +9,12 @@
 
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
-use robot::{Library, ModelDetails, Settings};
+use robot::{Library, Model, ModelDetails, Settings, hull};
 use scene::{FixedBox, FloorPatch, PlantRobot, PlantScene, SceneFiles};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 type Answer<T> = Result<T, Box<dyn Error>>;
@@ -35,44 +36,66 @@ impl Draw {
     }
 }
 
-fn robots(library: &Path, draw: &mut Draw) -> Answer<Vec<PlantRobot>> {
+/// A drawn posture whose loops close.
+fn posture(model: &Model, draw: &mut Draw) -> Vec<f64> {
+    for _ in 0..200 {
+        let drawn: Vec<f64> = (0..model.n_free())
+            .map(|free| {
+                let [low, high] = model.limits(free);
+                draw.within(low, high)
+            })
+            .collect();
+        if model.loop_gap(&drawn) <= 1e-4 {
+            return drawn;
+        }
+    }
+    model.home()
+}
+
+/// A robot of the scene, and the name of the tool that it has.
+struct Placed {
+    robot: PlantRobot,
+    tool: Option<String>,
+}
+
+/// Each model in a drawn place, and the first one twice more: on a ceiling, and on a wall with the
+/// tool of the library, if there is one.
+fn robots(library: &Path, draw: &mut Draw) -> Answer<Vec<Placed>> {
     let settings = Settings::without_clouds();
-    let loaded = Library::load(library, &settings)?;
+    let models = Library::load(library, &settings)?.models;
+    let first = models.iter().find(|model| !model.is_tool()).ok_or("the library has no robot")?;
+    let tool = models.iter().find(|model| model.is_tool());
+    let all = models.iter().map(|model| (model, None, None));
+    let ceiling = (first, None, Some([PI, 0.0, 1.1]));
+    let wall = (first, tool, Some([0.7, FRAC_PI_2, -0.4]));
+    let corners = [[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.3]];
+    let piece = hull(&corners).ok_or("a tetrahedron has a hull")?;
+    let load = |model: &Model| ModelDetails::load(&library.join(&model.name), model, &settings);
     let mut out = Vec::new();
-    for (at, model) in loaded.models.into_iter().enumerate() {
-        // A posture whose loops close.
-        let mut posture = model.home();
-        for _ in 0..200 {
-            let drawn: Vec<f64> = (0..model.n_free())
-                .map(|free| {
-                    let [low, high] = model.limits(free);
-                    draw.within(low, high)
-                })
-                .collect();
-            if model.loop_gap(&drawn) <= 1e-4 {
-                posture = drawn;
-                break;
-            }
+    for (at, (bare, tool, turn)) in all.chain([ceiling, wall]).enumerate() {
+        let (mut model, mut details) = (bare.clone(), load(bare)?);
+        if let (Some(tool), Some(&flange)) = (tool, bare.flanges().first()) {
+            model = bare.with_tool(tool, flange, 0.3);
+            details = details.with_tool(&load(tool)?);
         }
         let place = Translation3::new(4.0 * at as f64, draw.within(-3.0, 3.0), draw.within(0., 2.));
-        let turn = UnitQuaternion::from_euler_angles(
-            draw.within(-0.5, 0.5),
-            draw.within(-0.5, 0.5),
-            draw.within(-3.1, 3.1),
-        );
-        out.push(PlantRobot {
+        let tilted = [draw.within(-0.5, 0.5), draw.within(-0.5, 0.5), draw.within(-3.1, 3.1)];
+        let [roll, pitch, yaw] = turn.unwrap_or(tilted);
+        let turn = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        let robot = PlantRobot {
             id: format!("R{}", at + 1),
-            details: ModelDetails::load(&library.join(&model.name), &model, &settings)?,
+            details,
             world_from_base: Pose::from_parts(place, turn),
-            posture,
-            hanging: BTreeMap::new(),
+            posture: posture(&model, draw),
+            hanging: BTreeMap::from([(model.links.len() - 1, vec![piece.clone()])]),
             model,
-        });
+        };
+        out.push(Placed { robot, tool: tool.map(|tool| tool.name.clone()) });
     }
     Ok(out)
 }
 
-fn truth(robot: &PlantRobot) -> Value {
+fn truth(Placed { robot, tool }: &Placed) -> Value {
     let pose = |pose: &Pose| {
         let (p, q) = (pose.translation, pose.rotation);
         json!({ "xyz": [p.x, p.y, p.z], "quat_wxyz": [q.w, q.i, q.j, q.k] })
@@ -81,7 +104,7 @@ fn truth(robot: &PlantRobot) -> Value {
     let poses = robot.world_from_links();
     let values = robot.model.joints.iter().map(|joint| &joint.name).zip(robot.values());
     json!({
-        "id": robot.id, "model": robot.model.name,
+        "id": robot.id, "model": robot.model.name, "tool": tool,
         "link_poses": links.zip(&poses).map(|(l, p)| (l.clone(), pose(p))).collect::<BTreeMap<_, _>>(),
         "values": values.map(|(name, value)| (name.clone(), value)).collect::<BTreeMap<_, _>>(),
     })
@@ -93,13 +116,15 @@ fn main() -> Answer<()> {
         return Err("call it with LIBRARY OUT SEED".into());
     };
     let mut draw = Draw(seed.parse()?);
+    let placed = robots(Path::new(library), &mut draw)?;
     let plant = PlantScene {
         name: "plant".into(),
-        robots: robots(Path::new(library), &mut draw)?,
+        robots: placed.iter().map(|placed| placed.robot.clone()).collect(),
         fixed: vec![
             FixedBox { center: [0.0, 5.0, 0.5], size: [2.0, 0.1, 1.0] },
             FixedBox { center: [3.0, 5.0, 0.25], size: [0.5, 0.5, 0.5] },
         ],
+        touching: Vec::new(),
         floor: Some(FloorPatch {
             world_from_floor: Pose::from(Vector::new(20.0, 0.0, -3.0)),
             size: [80.0, 40.0],
@@ -123,7 +148,7 @@ fn main() -> Answer<()> {
         }
         std::fs::write(Path::new(out).join(format).join("notes.txt"), written.notes.join("\n"))?;
     }
-    let robots: Vec<Value> = plant.robots.iter().map(truth).collect();
+    let robots: Vec<Value> = placed.iter().map(truth).collect();
     std::fs::write(Path::new(out).join("truth.json"), json!({ "robots": robots }).to_string())?;
     Ok(())
 }

@@ -26,8 +26,14 @@ impl PlantScene {
             b.center.iter().all(|v| v.is_finite())
                 && b.size.iter().all(|v| v.is_finite() && *v > 0.0)
         };
-        if !self.fixed.iter().all(is_box) {
+        if !self.fixed.iter().chain(self.touching.iter().flat_map(|t| &t.boxes)).all(is_box) {
             return Err(Error::new(Kind::Bug, "a box of the fixed world has no extent"));
+        }
+        let is_there = |[robot, link]: &[usize; 2]| {
+            self.robots.get(*robot).is_some_and(|robot| *link < robot.model.links.len())
+        };
+        if !self.touching.iter().all(|t| t.links.iter().all(is_there) && !t.boxes.is_empty()) {
+            return Err(Error::new(Kind::Bug, "the fixed world meets a link that is not there"));
         }
         Ok(())
     }

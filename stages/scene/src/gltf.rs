@@ -3,7 +3,7 @@
 
 use crate::joint_rules::JointRule;
 use crate::names::{NameMap, NameRule};
-use crate::output::{RobotToWrite, SceneFiles, body_color, fixed_color, names_table};
+use crate::output::{RobotToWrite, SceneFiles, body_color, fixed_color, linear, names_table};
 use crate::plant_scene::{PlantScene, box_mesh, slides};
 use contract::{Error, Kind, Result};
 use geometry::{Pose, Vector};
@@ -54,10 +54,15 @@ struct GltfFile {
 
 fn fixed(scene: &PlantScene, file: &mut GltfFile) -> Vec<usize> {
     let mut children = Vec::new();
-    if let Some(first) = scene.fixed.first() {
-        let about = Vector::from(first.center);
-        let mesh = file.mesh(&box_mesh(&scene.fixed, &about), fixed_color());
-        children.push(file.node("fixed", &Pose::from(about), mesh, json!({})));
+    for (name, boxes, links) in scene.fixed_groups() {
+        let about = Vector::from(boxes[0].center);
+        let mesh = file.mesh(&box_mesh(boxes, &about), fixed_color(links));
+        let met = links.iter().map(|&[robot, link]| {
+            let robot = &scene.robots[robot];
+            json!({ "robot": robot.id, "link": robot.model.links[link].name })
+        });
+        let extras = json!({ "meets_as_found": met.collect::<Vec<_>>() });
+        children.push(file.node(&name, &Pose::from(about), mesh, extras));
     }
     if let Some(floor) = &scene.floor {
         let [x, y] = floor.size.map(|edge| (edge / 2.0) as f32);
@@ -165,7 +170,7 @@ impl GltfFile {
             let mode = if color[3] < 1.0 { "BLEND" } else { "OPAQUE" };
             self.materials.push(json!({
                 "pbrMetallicRoughness": {
-                    "baseColorFactor": color, "metallicFactor": 0.1, "roughnessFactor": 0.8,
+                    "baseColorFactor": linear(color), "metallicFactor": 0.1, "roughnessFactor": 0.8,
                 },
                 "alphaMode": mode, "doubleSided": true,
             }));

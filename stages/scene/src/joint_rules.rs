@@ -1,7 +1,7 @@
 //! What moves each joint, as far as formats can say it: rules of loops that are lines become
 //! followers, and pins of loops that close become joints.
 
-use crate::plant_scene::PlantRobot;
+use crate::plant_scene::{PlantRobot, slides};
 use geometry::{Point, Pose, Vector};
 use nalgebra::Unit;
 use robot::{JointKind, Motion};
@@ -14,6 +14,9 @@ const CLOSED: f64 = 1e-4;
 /// Deviation up to which a joint in a loop counts as a line of another, radians or metres: what is
 /// left of rounding.
 const LINE: f64 = 1e-9;
+
+/// Limit of a slide that follows a joint without end, metres: farther than any plant is wide.
+const FAR: f64 = 1e4;
 
 /// What moves a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +60,9 @@ pub(crate) struct JointRules {
     /// what the joint that it follows lets it reach; `None` for continuous joints that move by
     /// themselves, and for fixed ones.
     pub(crate) limits: Vec<Option<[f64; 2]>>,
+    /// Joints that are moved by others and stand outside of the limits that the library states for
+    /// them: a simulator would force them, and all that moves with them, back.
+    pub(crate) widened: Vec<usize>,
 }
 
 impl JointRules {
@@ -73,8 +79,12 @@ impl JointRules {
             .map(|(own, pin)| scene_pin(robot, own.passive.first().copied(), pin, &postures))
             .collect();
         let n_open = all.iter().filter(|pin| pin.is_none()).count();
-        let limits = (0..rules.len()).map(|j| range(robot, j, &rules, &values)).collect();
-        Self { rules, pins: all.into_iter().flatten().collect(), n_open, limits }
+        let found = robot.values();
+        let widened = (0..rules.len()).filter(|j| is_outside(robot, *j, rules[*j], found[*j]));
+        let widened: Vec<usize> = widened.collect();
+        let range = |j| range(robot, j, &rules, &values, widened.contains(&j));
+        let limits = (0..rules.len()).map(range).collect();
+        Self { rules, pins: all.into_iter().flatten().collect(), n_open, limits, widened }
     }
 }
 
@@ -168,20 +178,33 @@ fn scene_pin(
     })
 }
 
+/// Whether a joint that is moved by others was found outside of its limits.
+fn is_outside(robot: &PlantRobot, j: usize, rule: JointRule, found: f64) -> bool {
+    let is_led = matches!(rule, JointRule::Follows { .. } | JointRule::Loop);
+    let limits = robot.model.joints[j].limits.filter(|[low, high]| low < high);
+    let is_beyond = |[low, high]: [f64; 2]| found < low - LINE || found > high + LINE;
+    is_led && limits.is_some_and(is_beyond)
+}
+
 /// The range of a joint; see [`JointRules::limits`].
 fn range(
     robot: &PlantRobot,
     j: usize,
     rules: &[JointRule],
     values: &[Vec<f64>],
+    is_widened: bool,
 ) -> Option<[f64; 2]> {
     let joint = &robot.model.joints[j];
-    let own = joint.limits.filter(|[low, high]| low < high);
+    let own = joint.limits.filter(|[low, high]| low < high && !is_widened);
     match rules[j] {
         JointRule::Fixed => None,
         JointRule::Free => joint.limits,
         JointRule::Follows { joint: driver, multiplier, offset } => own.or_else(|| {
-            let [a, b] = robot.model.joints[driver].limits?.map(|v| multiplier * v + offset);
+            let Some(ends) = robot.model.joints[driver].limits else {
+                // A slide without limits would be locked.
+                return slides(joint).then_some([-FAR, FAR]);
+            };
+            let [a, b] = ends.map(|v| multiplier * v + offset);
             Some([a.min(b), a.max(b)])
         }),
         JointRule::Loop => own.or_else(|| {

@@ -34,7 +34,8 @@ pub(crate) fn link_pairs(
         model.joints.iter().map(|j| [leader[j.parent], leader[j.child]]).collect();
     near.extend(rules.pins.iter().map(|pin| [leader[pin.link_a], leader[pin.link_b]]));
     let poses = model.poses(&robot.posture);
-    let shapes: Vec<Vec<SharedShape>> = (0..model.links.len()).map(|l| hulls(robot, l)).collect();
+    let of = |l| hulls(robot, l).into_iter().map(|(shape, _)| shape).collect();
+    let shapes: Vec<Vec<SharedShape>> = (0..model.links.len()).map(of).collect();
     let mut out = Vec::new();
     for a in 0..model.links.len() {
         for b in a + 1..model.links.len() {
@@ -52,13 +53,14 @@ pub(crate) fn link_pairs(
     out
 }
 
-fn hulls(robot: &PlantRobot, link: usize) -> Vec<SharedShape> {
+/// Hulls of the bodies of a link in its frame, each with its vertices.
+pub(crate) fn hulls(robot: &PlantRobot, link: usize) -> Vec<(SharedShape, Vec<[f32; 3]>)> {
     let bodies = robot.bodies(link);
     let hulls = bodies.iter().filter_map(|body| hull(&body.mesh.vertices));
     hulls
         .filter_map(|mesh| {
             let points: Vec<Vec3> = mesh.vertices.iter().map(|v| Vec3::from_array(*v)).collect();
-            SharedShape::convex_hull(&points)
+            Some((SharedShape::convex_hull(&points)?, mesh.vertices))
         })
         .collect()
 }

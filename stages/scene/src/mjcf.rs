@@ -5,11 +5,14 @@ use crate::joint_rules::JointRule;
 use crate::link_pairs::link_pairs;
 use crate::names::{NameMap, NameRule};
 use crate::output::{RobotToWrite, SceneFiles, body_color, fixed_color, names_table};
-use crate::plant_scene::PlantScene;
+use crate::plant_scene::{FLOOR_DEPTH, LinkBody, PlantScene};
+use crate::stl::stl;
 use crate::text::{XmlText, num, nums};
 use contract::{Error, Kind, Result, quote};
 use geometry::Pose;
-use robot::{JointKind, hull};
+use robot::{JointKind, Mesh, hull};
+use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 /// Writes the scene.
 ///
@@ -41,30 +44,58 @@ pub fn mjcf(scene: &PlantScene) -> Result<SceneFiles> {
     }
     xml.close();
     xml.close();
-    contacts(&robots, &names, &mut xml);
+    contacts(scene, &robots, &names, &mut xml);
     equalities(&robots, &names, &mut xml);
     key_frame(&robots, &mut xml)?;
     out.add("plant.xml", xml.finish());
     for own in &robots {
-        out.add_meshes(&format!("meshes/{}", quote::file_name(&own.robot.id)), own.robot);
+        for piece in (0..own.robot.model.links.len()).flat_map(|link| pieces(own, link)) {
+            out.add(format!("meshes/{}.stl", piece.name), stl(&piece.mesh, 1.0));
+        }
         out.note_robot(own.robot, &own.rules);
     }
     out.add("names.csv", names_table(&robots, &names));
     Ok(out)
 }
 
-fn asset_name(own: &RobotToWrite<'_>, body: &str) -> String {
-    format!("{}/{body}", quote::file_name(&own.robot.id))
+/// A mesh of a link as MuJoCo takes it.
+struct MeshPiece<'a> {
+    name: String,
+    mesh: Cow<'a, Mesh>,
+    hangs: bool,
+}
+
+/// The meshes of a link: those that are too large for MuJoCo in parts, and none that is too small.
+fn pieces<'a>(own: &RobotToWrite<'a>, link: usize) -> Vec<MeshPiece<'a>> {
+    /// Most triangles of a mesh that MuJoCo reads.
+    const MOST: usize = 200_000;
+    /// Fewest vertices.
+    const FEWEST: usize = 4;
+    let mut out = Vec::new();
+    for LinkBody { name, mesh, hangs } in own.robot.bodies(link) {
+        let name = format!("{}/{name}", quote::file_name(&own.robot.id));
+        let places: BTreeSet<[u32; 3]> =
+            mesh.vertices.iter().map(|v| v.map(|x| (x + 0.0).to_bits())).collect();
+        if places.len() < FEWEST {
+            continue;
+        }
+        if mesh.triangles.len() <= MOST {
+            out.push(MeshPiece { name, mesh: Cow::Borrowed(mesh), hangs });
+            continue;
+        }
+        for (k, part) in mesh.triangles.chunks(MOST).enumerate() {
+            let part = Mesh { vertices: mesh.vertices.clone(), triangles: part.to_vec() };
+            out.push(MeshPiece { name: format!("{name}_part_{k}"), mesh: Cow::Owned(part), hangs });
+        }
+    }
+    out
 }
 
 fn assets(own: &RobotToWrite<'_>, xml: &mut XmlText) {
-    for link in 0..own.robot.model.links.len() {
-        for body in own.robot.bodies(link) {
-            let name = asset_name(own, &body.name);
-            let file = format!("{name}.stl");
-            // Of a mesh that is no body the volume is not taken.
-            xml.empty("mesh", &[("name", &name), ("file", &file), ("inertia", "shell")]);
-        }
+    for piece in (0..own.robot.model.links.len()).flat_map(|link| pieces(own, link)) {
+        let (name, file) = (&piece.name, format!("{}.stl", piece.name));
+        // Of a mesh that is no body the volume is not taken.
+        xml.empty("mesh", &[("name", name), ("file", &file), ("inertia", "shell")]);
     }
 }
 
@@ -74,19 +105,26 @@ fn pose_words(pose: &Pose) -> [String; 2] {
 }
 
 fn fixed(scene: &PlantScene, xml: &mut XmlText) {
-    let rgba = nums(&fixed_color(), " ");
-    for own in &scene.fixed {
-        let half = nums(&own.size.map(|edge| edge / 2.0), " ");
-        let (pos, rgba) = (nums(&own.center, " "), &rgba);
-        xml.empty("geom", &[("type", "box"), ("size", &half), ("pos", &pos), ("rgba", rgba)]);
+    for (name, boxes, links) in scene.fixed_groups() {
+        let rgba = nums(&fixed_color(links), " ");
+        // Bodies are what pairs without contact are made of.
+        xml.open("body", &[("name", &name)]);
+        for own in boxes {
+            let half = nums(&own.size.map(|edge| edge / 2.0), " ");
+            let (pos, rgba) = (nums(&own.center, " "), &rgba);
+            xml.empty("geom", &[("type", "box"), ("size", &half), ("pos", &pos), ("rgba", rgba)]);
+        }
+        xml.close();
     }
     if let Some(floor) = &scene.floor {
-        let [pos, quat] = pose_words(&floor.world_from_floor);
-        let [x, y] = floor.size.map(|edge| edge / 2.0);
-        let size = nums(&[x, y, 1.0], " ");
+        // A plane would be without end.
+        let below = Pose::translation(0.0, 0.0, -FLOOR_DEPTH / 2.0);
+        let [pos, quat] = pose_words(&(floor.world_from_floor * below));
+        let [x, y] = floor.size;
+        let size = nums(&[x, y, FLOOR_DEPTH].map(|edge| edge / 2.0), " ");
         let place = [("pos", &*pos), ("quat", &quat), ("rgba", "0.8 0.8 0.8 1")];
-        let plane = [("name", "floor"), ("type", "plane"), ("size", &size)];
-        xml.empty("geom", &[&plane[..], &place].concat());
+        let body = [("name", "floor"), ("type", "box"), ("size", &size)];
+        xml.empty("geom", &[&body[..], &place].concat());
     }
 }
 
@@ -111,13 +149,12 @@ fn body(own: &RobotToWrite<'_>, link: usize, pose: &Pose, names: &NameMap, xml: 
     if let Some(j) = model.links[link].parent_joint {
         joint(own, j, names, xml);
     }
-    for body in robot.bodies(link) {
-        let mesh = asset_name(own, &body.name);
-        let rgba = nums(&body_color(robot, link, body.hangs), " ");
-        let shown = [("type", "mesh"), ("mesh", &*mesh), ("rgba", &rgba), ("mass", "0")];
+    for piece in pieces(own, link) {
+        let rgba = nums(&body_color(robot, link, piece.hangs), " ");
+        let shown = [("type", "mesh"), ("mesh", &*piece.name), ("rgba", &rgba), ("mass", "0")];
         // What is flat has no hull that could collide.
         let flat = [("contype", "0"), ("conaffinity", "0")];
-        let is_flat = hull(&body.mesh.vertices).is_none();
+        let is_flat = hull(&piece.mesh.vertices).is_none();
         xml.empty("geom", &[&shown[..], if is_flat { &flat } else { &[] }].concat());
     }
     for (k, pin) in own.rules.pins.iter().enumerate() {
@@ -164,8 +201,13 @@ fn joint(own: &RobotToWrite<'_>, j: usize, names: &NameMap, xml: &mut XmlText) {
     xml.empty("joint", &all);
 }
 
-fn contacts(robots: &[RobotToWrite<'_>], names: &NameMap, xml: &mut XmlText) {
+fn contacts(scene: &PlantScene, robots: &[RobotToWrite<'_>], names: &NameMap, xml: &mut XmlText) {
     xml.open("contact", &[]);
+    for (name, _, links) in scene.fixed_groups() {
+        for &[robot, link] in links {
+            xml.empty("exclude", &[("body1", &name), ("body2", names.link(robot, link))]);
+        }
+    }
     for own in robots {
         for (a, b, _) in link_pairs(own.robot, &own.rules) {
             let [a, b] = [a, b].map(|link| names.link(own.at, link));
@@ -184,9 +226,7 @@ fn equalities(robots: &[RobotToWrite<'_>], names: &NameMap, xml: &mut XmlText) {
             xml.empty("connect", &[("name", &name), ("site1", &a), ("site2", &b)]);
         }
         for j in own.moving() {
-            let is_in_loop = matches!(own.robot.model.joints[j].motion, robot::Motion::Loop(_));
-            // A loop of pins moves its joints itself.
-            if is_in_loop && own.rules.n_open == 0 {
+            if own.is_held_by_pins(j) {
                 continue;
             }
             if let JointRule::Follows { joint, multiplier, offset } = own.rules.rules[j] {

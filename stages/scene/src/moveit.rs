@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! R1/robot.srdf    groups, the state `as_found`, passive joints, pairs that may touch
+//! R1/touching.yaml pairs of objects and links to be allowed in MoveIt's collision matrix
 //! R1/plant.scene   the fixed world as boxes, the floor, the other robots' links as meshes
 //! ```
 
@@ -10,11 +11,11 @@ use crate::joint_rules::JointRule;
 use crate::link_pairs::{PairReason, link_pairs};
 use crate::names::{NameMap, NameRule};
 use crate::output::{RobotToWrite, SceneFiles, names_by_robot, names_table};
-use crate::plant_scene::{FLOOR_DEPTH, PlantScene};
+use crate::plant_scene::{FLOOR_DEPTH, FixedBox, PlantRobot, PlantScene, size};
 use crate::text::{XmlText, num, nums};
 use crate::urdf;
 use contract::{Result, quote};
-use geometry::Pose;
+use geometry::{Pose, Vector};
 use std::fmt::Write as _;
 
 /// Writes URDF and SRDF of each robot.
@@ -44,7 +45,8 @@ fn written(scene: &PlantScene, package: Option<&str>, with_scene: bool) -> Resul
         out.add(format!("{folder}/robot.srdf"), semantics(own, &names));
         if with_scene {
             let others: Vec<_> = robots.iter().filter(|other| other.at != own.at).collect();
-            out.add(format!("{folder}/plant.scene"), planning_scene(scene, &others));
+            out.add(format!("{folder}/plant.scene"), planning_scene(scene, own.robot, &others));
+            out.add(format!("{folder}/touching.yaml"), touching(scene, own, &names));
         }
     }
     out.add("names.csv", names_table(&robots, &names));
@@ -72,12 +74,18 @@ fn semantics(own: &RobotToWrite<'_>, names: &NameMap) -> Vec<u8> {
         others.iter().for_each(|j| xml.empty("joint", &[("name", joint(*j))]));
         xml.close();
     }
-    for (group, joints) in [("arm", &chain), ("others", &others)] {
-        if joints.is_empty() {
-            continue;
-        }
+    let all: Vec<usize> = chain.iter().chain(&others).copied().collect();
+    let has_both = !chain.is_empty() && !others.is_empty();
+    if has_both {
+        xml.open("group", &[("name", "all")]);
+        ["arm", "others"].iter().for_each(|name| xml.empty("group", &[("name", name)]));
+        xml.close();
+    }
+    // Of states of one name pinocchio takes the first: that of all joints.
+    let groups = [("all", &all, has_both), ("arm", &chain, true), ("others", &others, true)];
+    for (group, joints, _) in groups.iter().filter(|(_, joints, is)| *is && !joints.is_empty()) {
         xml.open("group_state", &[("name", "as_found"), ("group", group)]);
-        for j in joints {
+        for j in *joints {
             xml.empty("joint", &[("name", joint(*j)), ("value", &num(own.values[*j]))]);
         }
         xml.close();
@@ -97,17 +105,52 @@ fn semantics(own: &RobotToWrite<'_>, names: &NameMap) -> Vec<u8> {
     xml.finish()
 }
 
+/// Objects of the planning scene that meet links as found: pairs for the matrix of allowed
+/// collisions, which a `.scene` does not hold.
+fn touching(scene: &PlantScene, own: &RobotToWrite<'_>, names: &NameMap) -> Vec<u8> {
+    let mut text = String::from(
+        "# Objects of plant.scene that meet links as found. Allow these pairs to collide, or the\n\
+         # start state is refused.\nallowed:\n",
+    );
+    for (name, _, links) in scene.fixed_groups() {
+        let of_robot = links.iter().filter(|[robot, _]| *robot == own.at);
+        let links: Vec<String> =
+            of_robot.map(|[_, link]| quote::yaml(names.link(own.at, *link))).collect();
+        if !links.is_empty() {
+            let _ = writeln!(text, "  {name}: [{}]", links.join(", "));
+        }
+    }
+    // The robot stands on it, if on anything.
+    let base = quote::yaml(names.link(own.at, 0));
+    let _ = writeln!(text, "  floor: [{base}]");
+    text.into_bytes()
+}
+
 /// Position and quaternion, a line each.
 fn pose_lines(text: &mut String, pose: &Pose) {
     let (p, q) = (pose.translation.vector, pose.rotation.coords);
     let _ = writeln!(text, "{}\n{}", nums(p.as_slice(), " "), nums(q.as_slice(), " "));
 }
 
-fn planning_scene(scene: &PlantScene, others: &[&RobotToWrite<'_>]) -> Vec<u8> {
+/// How far beyond a robot's reach things are kept, metres: it may be given something to carry.
+const CARRIED: f64 = 2.0;
+
+/// What stands around a robot, as far as it can reach: scenes of many robots would otherwise grow
+/// with the square of their number.
+fn planning_scene(scene: &PlantScene, own: &PlantRobot, others: &[&RobotToWrite<'_>]) -> Vec<u8> {
+    let base = own.world_from_base.translation.vector;
+    let reach = own.reach() + CARRIED;
+    let is_near = |middle: &Vector, radius: f64| (middle - base).norm() <= reach + radius;
     let mut text = format!("{}\n", quote::file_name(&scene.name));
-    if !scene.fixed.is_empty() {
-        object(&mut text, "fixed", &Pose::identity(), scene.fixed.len());
-        for own in &scene.fixed {
+    let half = |own: &FixedBox| Vector::from(own.size).norm() / 2.0;
+    for (name, boxes, _) in scene.fixed_groups() {
+        let near = boxes.iter().filter(|own| is_near(&Vector::from(own.center), half(own)));
+        let near: Vec<&FixedBox> = near.collect();
+        if near.is_empty() {
+            continue;
+        }
+        object(&mut text, &name, &Pose::identity(), near.len());
+        for own in near {
             let [x, y, z] = own.center;
             let _ = writeln!(text, "box\n{}", nums(&own.size, " "));
             pose_lines(&mut text, &Pose::translation(x, y, z));
@@ -125,7 +168,8 @@ fn planning_scene(scene: &PlantScene, others: &[&RobotToWrite<'_>]) -> Vec<u8> {
     for other in others {
         let poses = other.robot.world_from_links();
         for (link, pose) in poses.iter().enumerate() {
-            let bodies = other.robot.bodies(link);
+            let mut bodies = other.robot.bodies(link);
+            bodies.retain(|body| is_near(&pose.translation.vector, size(body.mesh)));
             if bodies.is_empty() {
                 continue;
             }

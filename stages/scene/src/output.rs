@@ -2,11 +2,16 @@
 
 use crate::joint_rules::{JointRule, JointRules};
 use crate::names::{NameMap, NameRule, Named};
-use crate::physics::{FIXED, HANGING};
+use crate::physics::{FIXED, HANGING, TOUCHING};
 use crate::plant_scene::{PlantRobot, PlantScene};
 use crate::stl::stl;
 use contract::quote;
+use robot::Motion;
 use std::fmt::Write as _;
+
+/// Distance from the origin beyond which single precision is named, metres: it is a tenth of a
+/// millimetre there.
+const FAR: f64 = 1e3;
 
 /// A file of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,6 +48,25 @@ impl SceneFiles {
     /// Adds what is to be said of a robot in any format.
     pub(crate) fn note_robot(&mut self, robot: &PlantRobot, rules: &JointRules) {
         self.notes.extend(robot.assumptions());
+        if !rules.widened.is_empty() {
+            let name = |j: &usize| quote::shown(&robot.model.joints[*j].name).into_owned();
+            self.notes.push(format!(
+                "{}: {} follow others and stand outside of the limits that the library states for \
+                 them; they are written with what the others let them reach",
+                robot.id,
+                rules.widened.iter().map(name).collect::<Vec<_>>().join(", ")
+            ));
+        }
+        let far = robot.world_from_base.translation.vector.norm();
+        if far > FAR {
+            self.notes.push(format!(
+                "{} stands {:.0} km from the origin: readers in single precision (frames of joints in \
+                 USD, glTF, PyBullet) place it up to {:.0} mm off; a frame near the robots avoids it",
+                robot.id,
+                far / 1e3,
+                far * f64::from(f32::EPSILON) * 1e3
+            ));
+        }
         if rules.n_open > 0 {
             self.notes.push(format!(
                 "{}: pins of its loops that do not meet in most postures were left out: {}",
@@ -73,6 +97,12 @@ impl<'a> RobotToWrite<'a> {
                 values: robot.values(),
             })
             .collect()
+    }
+
+    /// Whether a joint is moved by the pins of its loop where a format has them.
+    pub(crate) fn is_held_by_pins(&self, joint: usize) -> bool {
+        let is_in_loop = matches!(self.robot.model.joints[joint].motion, Motion::Loop(_));
+        is_in_loop && self.rules.n_open == 0
     }
 
     /// Indices of the joints that are written as moving ones.
@@ -135,7 +165,17 @@ pub(crate) fn body_color(robot: &PlantRobot, link: usize, hangs: bool) -> [f64; 
     if hangs { HANGING } else { robot.color(link) }
 }
 
-/// The colour of what stands still.
-pub(crate) fn fixed_color() -> [f64; 4] {
-    FIXED
+/// A colour as renderers calculate with it: URDFs state it as screens show it (sRGB), USD and glTF
+/// in proportion to light.
+pub(crate) fn linear([r, g, b, opacity]: [f64; 4]) -> [f64; 4] {
+    let one = |v: f64| {
+        let light = if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+        (light * 1e6).round() / 1e6
+    };
+    [one(r), one(g), one(b), opacity]
+}
+
+/// The colour of what stands still; of what meets robots as found another one.
+pub(crate) fn fixed_color(links: &[[usize; 2]]) -> [f64; 4] {
+    if links.is_empty() { FIXED } else { TOUCHING }
 }

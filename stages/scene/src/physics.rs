@@ -98,5 +98,7 @@ fn box_inertial(link_from_inertia: Pose, size: [f64; 3], mass: f64) -> Inertial 
 
 /// Colour of what hangs on robots.
 pub(crate) const HANGING: [f64; 4] = [0.9, 0.55, 0.1, 1.0];
+/// Colour of what stands still and meets robots as found.
+pub(crate) const TOUCHING: [f64; 4] = [0.75, 0.6, 0.45, 1.0];
 /// Colour of what stands still.
 pub(crate) const FIXED: [f64; 4] = [0.55, 0.58, 0.6, 1.0];

@@ -14,8 +14,10 @@ pub struct PlantScene {
     pub name: String,
     /// The robots.
     pub robots: Vec<PlantRobot>,
-    /// Boxes that together cover what stands still.
+    /// Boxes that together cover what stands still, but for what meets a robot as found.
     pub fixed: Vec<FixedBox>,
+    /// What stands still and meets links of robots as found: contacts of these pairs mean nothing.
+    pub touching: Vec<TouchingBoxes>,
     /// The floor, if one was found.
     pub floor: Option<FloorPatch>,
 }
@@ -27,6 +29,15 @@ pub struct FixedBox {
     pub center: [f64; 3],
     /// Its edges, metres.
     pub size: [f64; 3],
+}
+
+/// Boxes that meet the hulls of the same links as found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TouchingBoxes {
+    /// The boxes.
+    pub boxes: Vec<FixedBox>,
+    /// Robots and links by their numbers.
+    pub links: Vec<[usize; 2]>,
 }
 
 /// A rectangle of the floor.
@@ -95,6 +106,16 @@ impl PlantRobot {
         out
     }
 
+    /// Upper bound of the distance of any part of the robot from its base's origin, metres.
+    pub(crate) fn reach(&self) -> f64 {
+        let ways = self.model.ways();
+        let one = |(link, way): (usize, &f64)| {
+            let bodies = self.bodies(link);
+            way + bodies.iter().map(|body| size(body.mesh)).fold(0.0, f64::max)
+        };
+        ways.iter().enumerate().map(one).fold(0.0, f64::max)
+    }
+
     /// Whether a joint moves: neither fixed, nor with equal limits.
     pub(crate) fn moves(&self, joint: usize) -> bool {
         let joint = &self.model.joints[joint];
@@ -107,9 +128,25 @@ impl PlantRobot {
     }
 }
 
+/// Largest distance of a vertex from the origin of the mesh, metres.
+pub(crate) fn size(mesh: &Mesh) -> f64 {
+    let of = |v: &[f32; 3]| Vector::from(v.map(f64::from)).norm();
+    mesh.vertices.iter().map(of).fold(0.0, f64::max)
+}
+
 /// Whether values of the joint are metres.
 pub(crate) fn slides(joint: &Joint) -> bool {
     joint.kind == JointKind::Prismatic
+}
+
+impl PlantScene {
+    /// What stands still in groups: each with its name, its boxes and the links that it meets.
+    pub(crate) fn fixed_groups(&self) -> Vec<(String, &[FixedBox], &[[usize; 2]])> {
+        let rest = (!self.fixed.is_empty()).then(|| ("fixed".into(), &self.fixed[..], &[][..]));
+        let touching = self.touching.iter().enumerate();
+        let touching = touching.map(|(k, t)| (format!("touching_{k}"), &t.boxes[..], &t.links[..]));
+        rest.into_iter().chain(touching).collect()
+    }
 }
 
 /// The meshes of all boxes as one, about a point of the world: coordinates of a plant far from its

@@ -13,7 +13,7 @@ use crate::plant_scene::{FLOOR_DEPTH, FixedBox, PlantRobot, PlantScene, box_mesh
 use crate::stl::stl;
 use crate::text::{num, nums};
 use contract::{Result, quote};
-use geometry::{Pose, Vector};
+use geometry::{Pose, Vector, roll_pitch_yaw};
 use std::fmt::Write as _;
 
 /// The part of the script that is the same for all scenes.
@@ -70,8 +70,7 @@ fn string(text: &str) -> String {
 /// Millimetres and degrees: the rotations about x, y and z of URDF.
 fn pose(pose: &Pose) -> String {
     let p = pose.translation.vector * 1e3;
-    let (r, t, y) = pose.rotation.euler_angles();
-    let [r, t, y] = [r, t, y].map(f64::to_degrees);
+    let [r, t, y] = roll_pitch_yaw(&pose.rotation).map(f64::to_degrees);
     format!("[{}]", nums(&[p.x, p.y, p.z, r, t, y], ", "))
 }
 
@@ -114,11 +113,11 @@ fn links(robot: &PlantRobot, text: &mut String) {
 }
 
 fn fixed(scene: &PlantScene, text: &mut String, out: &mut SceneFiles) {
-    if let Some(first) = scene.fixed.first() {
-        let about = Vector::from(first.center);
-        out.add("meshes/fixed.stl", stl(&box_mesh(&scene.fixed, &about), 1.0));
+    for (name, boxes, _) in scene.fixed_groups() {
+        let about = Vector::from(boxes[0].center);
+        out.add(format!("meshes/{name}.stl"), stl(&box_mesh(boxes, &about), 1.0));
         let place = pose(&Pose::from(about));
-        let _ = writeln!(text, "    (\"fixed\", \"meshes/fixed.stl\", {place}),");
+        let _ = writeln!(text, "    (\"{name}\", \"meshes/{name}.stl\", {place}),");
     }
     if let Some(floor) = &scene.floor {
         let size = [floor.size[0], floor.size[1], FLOOR_DEPTH];

@@ -2,16 +2,17 @@
 //! and values of joints count from there, so that the limits are shifted by the found values.
 
 use crate::joint_rules::JointRule;
-use crate::names::{NameRule, Named};
+use crate::names::{NameMap, NameRule, Named};
 use crate::output::{
     RobotToWrite, SceneFile, SceneFiles, body_color, fixed_color, names_by_robot, names_table,
 };
-use crate::plant_scene::{PlantScene, box_mesh, slides};
+use crate::plant_scene::{FLOOR_DEPTH, PlantScene, box_mesh, slides};
 use crate::stl::stl;
 use crate::text::{XmlText, num, nums};
 use contract::{Result, quote};
 use geometry::{Pose, Vector};
 use robot::{ExtraNode, JointKind};
+use std::collections::BTreeSet;
 
 /// Writes the scene.
 ///
@@ -59,7 +60,7 @@ pub fn sdf(scene: &PlantScene) -> Result<SceneFiles> {
             xml.close();
             xml.close();
         }
-        plugins(own, &mut xml, &mut out);
+        plugins(own, &names, &mut xml, &mut out);
         xml.close();
         out.add_meshes(&format!("meshes/{}", quote::file_name(&own.robot.id)), own.robot);
         out.note_robot(own.robot, &own.rules);
@@ -92,20 +93,26 @@ fn mesh(xml: &mut XmlText, uri: &str) {
     xml.close();
 }
 
-/// What stands still: one mesh of all boxes about their middle, and the floor.
+/// What stands still: meshes of boxes about the middle of their first, and the floor.
 fn fixed(scene: &PlantScene, xml: &mut XmlText, out: &mut SceneFiles) {
-    let about = scene.fixed.first().map_or_else(Vector::zeros, |b| Vector::from(b.center));
-    if !scene.fixed.is_empty() {
-        out.add("meshes/fixed.stl", stl(&box_mesh(&scene.fixed, &about), 1.0));
-        xml.open("model", &[("name", "fixed")]);
+    if !scene.touching.is_empty() {
+        let what = "what stands still and meets robots as found is only seen in SDF";
+        out.notes.push(format!("{what}, where no pairs can be left out: the models touching_*"));
+    }
+    for (name, boxes, links) in scene.fixed_groups() {
+        let about = Vector::from(boxes[0].center);
+        let file = format!("meshes/{name}.stl");
+        out.add(&*file, stl(&box_mesh(boxes, &about), 1.0));
+        xml.open("model", &[("name", &name)]);
         xml.value("static", &[], "true");
         pose(xml, &Pose::from(about), None);
-        xml.open("link", &[("name", "fixed_link")]);
-        for kind in ["visual", "collision"] {
+        xml.open("link", &[("name", &format!("{name}_link"))]);
+        let kinds = ["visual", "collision"].into_iter();
+        for kind in kinds.take(if links.is_empty() { 2 } else { 1 }) {
             xml.open(kind, &[("name", kind)]);
-            mesh(xml, "meshes/fixed.stl");
+            mesh(xml, &file);
             if kind == "visual" {
-                material(xml, fixed_color());
+                material(xml, fixed_color(links));
             }
             xml.close();
         }
@@ -119,10 +126,12 @@ fn fixed(scene: &PlantScene, xml: &mut XmlText, out: &mut SceneFiles) {
         xml.open("link", &[("name", "floor_link")]);
         for kind in ["visual", "collision"] {
             xml.open(kind, &[("name", kind)]);
+            // A plane would be without end.
+            pose(xml, &Pose::translation(0.0, 0.0, -FLOOR_DEPTH / 2.0), None);
             xml.open("geometry", &[]);
-            xml.open("plane", &[]);
-            xml.value("normal", &[], "0 0 1");
-            xml.value("size", &[], &nums(&floor.size, " "));
+            xml.open("box", &[]);
+            let [x, y] = floor.size;
+            xml.value("size", &[], &nums(&[x, y, FLOOR_DEPTH], " "));
             xml.close();
             xml.close();
             xml.close();
@@ -199,30 +208,38 @@ fn write_joint(own: &RobotToWrite<'_>, j: usize, name: &str, ends: [&str; 2], xm
 }
 
 /// Plugins of the library's `gazebo` elements for the whole model; all else of them is named.
-fn plugins(own: &RobotToWrite<'_>, xml: &mut XmlText, out: &mut SceneFiles) {
-    let same = |_: bool, name: &str| name.to_owned();
-    let mut left_out = std::collections::BTreeSet::new();
-    for extra in &own.robot.details.extras {
-        let is_model = extra.tag == "gazebo" && extra.attribute("reference").is_none();
-        for child in extra.children.iter().filter(|_| extra.tag == "gazebo") {
+fn plugins(own: &RobotToWrite<'_>, names: &NameMap, xml: &mut XmlText, out: &mut SceneFiles) {
+    let link = |l: usize| names.link(own.at, l);
+    let joint = |j: usize| names.joint(own.at, j);
+    let mut left_out = BTreeSet::new();
+    for extra in own.robot.details.extras.iter().filter(|extra| extra.tag == "gazebo") {
+        let is_model = !extra.has("reference");
+        for child in &extra.children {
             match child {
                 ExtraNode::Element(element)
                     if is_model
                         && element.tag == "plugin"
-                        && element.attribute("filename").is_some()
-                        && element.attribute("name").is_some() =>
+                        && element.has("filename")
+                        && element.has("name") =>
                 {
-                    xml.raw(&element.text(&same));
+                    xml.raw(&element.text(&link, &joint));
                 }
-                ExtraNode::Element(element) => drop(left_out.insert(element.tag.clone())),
+                ExtraNode::Element(element) => drop(left_out.insert(element.tag.as_str())),
                 ExtraNode::Text(_) => {}
             }
         }
     }
+    let id = &own.robot.id;
     if !left_out.is_empty() {
-        let all: Vec<String> = left_out.into_iter().collect();
-        let id = &own.robot.id;
+        let all: Vec<&str> = left_out.into_iter().collect();
         let what = "of the library's gazebo elements SDF was given only plugins of the model";
         out.notes.push(format!("{id}: {what}; not {}", all.join(", ")));
+    }
+    let follows = |j: usize| matches!(own.rules.rules[j], JointRule::Follows { .. });
+    let is_led = |j: &usize| follows(*j) && !own.is_held_by_pins(*j);
+    let led: Vec<&str> = own.moving().filter(is_led).map(joint).collect();
+    if !led.is_empty() {
+        let what = "SDF 1.9 has no joints that follow others; nothing moves";
+        out.notes.push(format!("{id}: {what} {}", led.join(", ")));
     }
 }

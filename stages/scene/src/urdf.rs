@@ -10,11 +10,13 @@
 use crate::joint_rules::JointRule;
 use crate::names::{NameMap, NameRule};
 use crate::output::{RobotToWrite, SceneFiles, body_color, names_by_robot, names_table};
+use crate::physics::HANGING;
 use crate::plant_scene::PlantScene;
 use crate::text::{XmlText, num, nums};
 use contract::{Result, quote};
-use geometry::Pose;
+use geometry::{Pose, roll_pitch_yaw};
 use robot::JointKind;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 /// Writes the URDFs of a scene; `package` makes mesh paths `package://`.
@@ -70,26 +72,45 @@ fn text(own: &RobotToWrite<'_>, names: &NameMap, package: Option<&str>) -> Vec<u
     xml.empty("parent", &[("link", "world")]);
     xml.empty("child", &[("link", names.link(own.at, 0))]);
     xml.close();
-    (0..own.robot.model.links.len()).for_each(|l| link(own, l, names, package, &mut xml));
+    for (l, material) in materials(own, names).iter().enumerate() {
+        link(own, l, names, (package, material), &mut xml);
+    }
     (0..own.robot.model.joints.len()).for_each(|j| joint(own, j, names, &mut xml));
-    let model = &own.robot.model;
-    let renamed = |is_joint: bool, name: &str| {
-        let joint = model.joints.iter().position(|j| j.name == name);
-        let link = model.links.iter().position(|l| l.name == name);
-        let written = match (is_joint, joint, link) {
-            (true, Some(j), _) => names.joint(own.at, j),
-            (false, _, Some(l)) => names.link(own.at, l),
-            _ => name,
-        };
-        written.to_owned()
-    };
-    own.robot.details.extras.iter().for_each(|extra| xml.raw(&extra.text(&renamed)));
+    let link_name = |l: usize| names.link(own.at, l);
+    let joint_name = |j: usize| names.joint(own.at, j);
+    for extra in &own.robot.details.extras {
+        xml.raw(&extra.text(&link_name, &joint_name));
+    }
     xml.finish()
 }
 
+/// Name of the material of what hangs on links.
+const HANGING_NAME: &str = "hanging";
+
+/// Name of each link's material: the library's, unless a link of another colour has it. Readers
+/// take the first colour of a name for all.
+fn materials(own: &RobotToWrite<'_>, names: &NameMap) -> Vec<String> {
+    let mut taken = BTreeMap::from([(HANGING_NAME.to_owned(), HANGING)]);
+    let details = own.robot.details.links.iter().enumerate();
+    let name = details.map(|(l, details)| {
+        let color = own.robot.color(l);
+        let first = match &details.material {
+            Some(name) => name.clone(),
+            None => format!("unnamed_of_{}", names.link(own.at, l)),
+        };
+        let more = (2..).map(|k| format!("{first}_{k}"));
+        let mut all = std::iter::once(first.clone()).chain(more);
+        let fits = |name: &String| taken.get(name).is_none_or(|own| *own == color);
+        let name = all.find(fits).unwrap_or(first);
+        taken.insert(name.clone(), color);
+        name
+    });
+    name.collect()
+}
+
 fn origin(xml: &mut XmlText, pose: &Pose) {
-    let (p, (roll, pitch, yaw)) = (pose.translation.vector, pose.rotation.euler_angles());
-    let (xyz, rpy) = (nums(p.as_slice(), " "), nums(&[roll, pitch, yaw], " "));
+    let (p, rpy) = (pose.translation.vector, roll_pitch_yaw(&pose.rotation));
+    let (xyz, rpy) = (nums(p.as_slice(), " "), nums(&rpy, " "));
     xml.empty("origin", &[("xyz", &xyz), ("rpy", &rpy)]);
 }
 
@@ -97,7 +118,7 @@ fn link(
     own: &RobotToWrite<'_>,
     link: usize,
     names: &NameMap,
-    package: Option<&str>,
+    (package, material): (Option<&str>, &str),
     xml: &mut XmlText,
 ) {
     let robot = own.robot;
@@ -123,10 +144,7 @@ fn link(
             xml.empty("mesh", &[("filename", &path)]);
             xml.close();
             if kind == "visual" {
-                let own_name = robot.details.links[link].material.as_deref();
-                let of_model = own_name.unwrap_or("unnamed_of_").to_owned()
-                    + own_name.map_or(names.link(own.at, link), |_| "");
-                let material = if body.hangs { "hanging" } else { &*of_model };
+                let material = if body.hangs { HANGING_NAME } else { material };
                 xml.open("material", &[("name", material)]);
                 let rgba = nums(&body_color(robot, link, body.hangs), " ");
                 xml.empty("color", &[("rgba", &rgba)]);

@@ -33,23 +33,44 @@ pub fn usd(scene: &PlantScene) -> Result<SceneFiles> {
     let mut text = UsdText::stage(&scene.name);
     text.open("def Xform \"World\" (\n    kind = \"assembly\"\n)");
     text.line("def PhysicsScene \"physicsScene\"\n{\n}");
-    fixed(scene, &mut text, &mut out);
+    fixed(scene, &names, &mut text, &mut out);
     for own in &robots {
         robot(own, &mut names, &mut text, &mut out);
         out.note_robot(own.robot, &own.rules);
+        let is_other = |j: &usize| match own.rules.rules[*j] {
+            JointRule::Follows { joint, .. } => !is_like(own, *j, joint),
+            _ => false,
+        };
+        let led = own.moving().filter(is_other).map(|j| names.joint(own.at, j));
+        let led: Vec<&str> = led.collect();
+        if !led.is_empty() {
+            let what = "in USD a joint follows only one of its own type; nothing moves";
+            out.notes.push(format!("{}: {what} {}", own.robot.id, led.join(", ")));
+        }
     }
     out.files.insert(0, SceneFile { path: "plant.usda".into(), bytes: text.finish() });
     out.add("names.csv", names_table(&robots, &names));
     Ok(out)
 }
 
-fn fixed(scene: &PlantScene, text: &mut UsdText, out: &mut SceneFiles) {
-    if !scene.fixed.is_empty() {
-        let about = Vector::from(scene.fixed[0].center);
-        let mesh = box_mesh(&scene.fixed, &about);
-        out.add("meshes/fixed.usda", mesh_file(&mesh, fixed_color(), "none"));
-        text.open("def Xform \"Fixed\" (\n    prepend references = @./meshes/fixed.usda@\n)");
+fn fixed(scene: &PlantScene, names: &NameMap, text: &mut UsdText, out: &mut SceneFiles) {
+    for (name, boxes, links) in scene.fixed_groups() {
+        let about = Vector::from(boxes[0].center);
+        let mesh = box_mesh(boxes, &about);
+        out.add(format!("meshes/{name}.usda"), mesh_file(&mesh, fixed_color(links), "none"));
+        text.open(&format!(
+            "def Xform \"{name}\" (\n    prepend references = @./meshes/{name}.usda@\n)"
+        ));
         text.place(&Pose::from(about));
+        if !links.is_empty() {
+            let path = |[robot, link]: &[usize; 2]| {
+                format!("</World/{}/{}>", names.robot(*robot), names.link(*robot, *link))
+            };
+            let all: Vec<String> = links.iter().map(path).collect();
+            text.open("over \"mesh\" (\n    prepend apiSchemas = [\"PhysicsFilteredPairsAPI\"]\n)");
+            text.line(&format!("rel physics:filteredPairs = [{}]", all.join(", ")));
+            text.close();
+        }
         text.close();
     }
     if let Some(floor) = &scene.floor {

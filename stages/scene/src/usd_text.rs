@@ -1,5 +1,6 @@
 //! Text of USD: one statement a line, blocks in braces.
 
+use crate::output::linear;
 use crate::text::{num, nums};
 use contract::quote;
 use geometry::{Pose, Vector};
@@ -108,7 +109,7 @@ pub(crate) fn mesh_file(mesh: &Mesh, color: [f64; 4], approximation: &str) -> Ve
     text.line(&format!("point3f[] points = [{}]", points.join(", ")));
     text.line("uniform token subdivisionScheme = \"none\"");
     text.line(&format!("uniform token physics:approximation = \"{approximation}\""));
-    let [r, g, b, a] = color;
+    let [r, g, b, a] = linear(color);
     text.line(&format!("color3f[] primvars:displayColor = [({})]", nums(&[r, g, b], ", ")));
     text.line(&format!("float[] primvars:displayOpacity = [{}]", num(a)));
     text.finish()

@@ -81,6 +81,7 @@ fn plant() -> PlantScene {
         name: "a plant".into(),
         robots: vec![robot("R1", 1.0), robot("R2", 4.0)],
         fixed: vec![FixedBox { center: [0.0, 0.0, 0.5], size: [0.2, 0.3, 1.0] }],
+        touching: Vec::new(),
         floor: Some(FloorPatch { world_from_floor: Pose::identity(), size: [10.0, 8.0] }),
     }
 }
@@ -166,6 +167,9 @@ fn an_srdf_has_the_posture_and_a_scene_the_other_robots() {
         })
         .collect();
     assert_eq!(found, BTreeMap::from([("j1", 0.4), ("j2", -0.3), ("j3", 0.1), ("j4", 2.0)]));
+    // Readers that know no groups take the first state of a name: it has all joints.
+    let first = document.descendants().find(|n| n.has_tag_name("group_state")).expect("one");
+    assert_eq!(first.children().filter(|n| n.has_tag_name("joint")).count(), found.len());
     assert!(srdf.contains("link1=\"world_2\" link2=\"2_lower\" reason=\"Adjacent\""), "{srdf}");
     let scene = text(&written, "R1/plant.scene");
     let lines: Vec<&str> = scene.lines().collect();
