@@ -134,22 +134,46 @@ fn scenes_are_the_same_and_load(dir: &Path, robots: &Path) {
     let (model, _) = robot::Model::load_urdf(&urdf, "R1", &settings).expect("loads");
     let result = export::ResultFile::read(&out).expect("a result");
     let entry = &result.robots[0];
-    let posture: Vec<f64> = entry.joints.0.iter().map(|(_, value)| *value).collect();
-    // Bars that follow the robot's joints follow in the URDF as well.
-    assert_eq!(model.n_free(), posture.len());
+    // Bars that follow the robot's joints follow in the URDF as well, but for one in a loop that is
+    // no line of a joint.
+    let known: std::collections::BTreeMap<&String, f64> =
+        entry.joints.0.iter().chain(&entry.passive.0).map(|(name, value)| (name, *value)).collect();
+    let free = model.free.iter().map(|&joint| &model.joints[joint].name);
+    let posture: Vec<f64> = free.map(|name| known[name]).collect();
+    assert_eq!(posture.len(), entry.joints.0.len() + 1);
     for ((name, stated), pose) in entry.link_poses.0.iter().zip(&model.poses(&posture)[1..]) {
         let off = (0..3).map(|i| (stated.xyz[i] - pose.translation.vector[i]).powi(2)).sum::<f64>();
         assert!(off.sqrt() < 1e-6, "{name} is off by {} m", off.sqrt());
     }
+    // Files of an earlier scene go when they are no part of the new one; those of others stay.
+    let folder = out.join("export/urdf");
+    std::fs::create_dir(folder.join("R9")).expect("is made");
+    for name in ["R9/robot.urdf", "mine.urdf"] {
+        std::fs::write(folder.join(name), "").expect("writes");
+    }
+    let list = std::fs::read_to_string(folder.join("files.txt")).expect("text");
+    std::fs::write(folder.join("files.txt"), list + "R9/robot.urdf\n").expect("writes");
+    let robots = Some(robots.to_path_buf());
+    let mut request = SceneRequest { out, format: Urdf, robots, package: None };
+    export_scene(&request, &means, &Engine::new(1)).expect("is written");
+    assert!(!folder.join("R9/robot.urdf").exists() && folder.join("mine.urdf").exists());
     // Another library is refused by name.
     let other = dir.join("other");
-    write_robots(&other).expect("the library is written");
+    request.robots = Some(other.clone());
     let path = other.join("demo_palletiser_2000/robot.urdf");
-    let text = std::fs::read_to_string(&path).expect("text");
-    std::fs::write(&path, text.replace("joint_3\"", "joint_three\"")).expect("writes");
-    let request = SceneRequest { out, format: Urdf, robots: Some(other), package: None };
-    let error = export_scene(&request, &means, &Engine::new(1)).expect_err("is refused");
-    assert!(error.to_string().contains("R1"), "{error}");
+    for (old, new, what) in [
+        ("joint_3\"", "joint_three\"", "other links or joints"),
+        ("<origin xyz=\"", "<origin xyz=\"0.1", "other frames of joints"),
+    ] {
+        write_robots(&other).expect("the library is written");
+        let text = std::fs::read_to_string(&path).expect("text");
+        assert!(text.contains(old), "{text}");
+        std::fs::write(&path, text.replace(old, new)).expect("writes");
+        let error = export_scene(&request, &means, &Engine::new(1)).expect_err("is refused");
+        let words = error.to_string();
+        assert!(words.contains("R1") && words.contains(what), "{words}");
+        std::fs::remove_dir_all(&other).expect("is removed");
+    }
 }
 
 /// Space about the robot: its body is its own, the air beside it was seen, the floor is fixed.

@@ -159,8 +159,8 @@ pub(super) struct ExportFlags {
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
     /// Format; files are written to OUT/export. A later run into OUT removes files of points
-    /// (copc, ply) if the points have changed, and reports it; scenes stay as they were
-    /// written
+    /// (copc, ply) if the points have changed, and reports it; scenes stay, and those of an
+    /// earlier result are named
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: ExportFormat,
     /// Robot library, for scenes (default: that of the run)

@@ -4,16 +4,19 @@
 use super::plant_state::PlantState;
 use crate::cache::{EXPORT, VerifiedFiles};
 use crate::detect::library;
-use crate::detect::robots::RobotList;
+use crate::detect::robots::{RobotList, poses};
 use crate::engine::Engine;
 use crate::io::own_paths::without_links;
 use crate::job::{Job, Means};
 use contract::{Error, Fit, Floor, Result, SpaceKind, Verdict, quote};
-use export::{ResultFile, RobotEntry, mesh_files};
-use geometry::{Aabb, Pose, Vector};
-use nalgebra::{Translation3, UnitQuaternion};
+use export::{BasePose, ResultFile, RobotEntry, mesh_files};
+use geometry::{Aabb, Point, Pose, Vector};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use robot::{Mesh, Model, ModelDetails};
-use scene::{FixedBox, FloorPatch, PlantRobot, PlantScene, SceneFiles, read_stl, voxel_boxes};
+use scene::{
+    FixedBox, FloorPatch, FoundHulls, PlantRobot, PlantScene, SceneFile, SceneFiles, TouchingBoxes,
+    read_stl, voxel_boxes,
+};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -65,6 +68,12 @@ impl SceneFormat {
         }
     }
 
+    /// Whether URDFs are written, whose mesh paths may be those of a ROS package.
+    #[must_use]
+    pub fn has_urdfs(self) -> bool {
+        matches!(self, Self::Urdf | Self::Srdf | Self::Moveit)
+    }
+
     fn write(self, plant: &PlantScene, package: Option<&str>) -> Result<SceneFiles> {
         match self {
             Self::Urdf => scene::urdf(plant, package),
@@ -99,28 +108,56 @@ pub fn export_scene(
     }
     let mut notes = Vec::new();
     let robots = scene_robots(request, &files, &result, &state, means, engine, &mut notes)?;
-    let plant = PlantScene {
-        name: "plant".into(),
-        robots,
-        fixed: fixed_boxes(out, &files, &result)?,
-        floor: floor_patch(&state.floor),
-    };
+    let floor = floor_patch(&state.floor).filter(|floor| {
+        let below = robots.iter().find(|robot| reaches_below(floor, robot));
+        notes.extend(below.map(|robot| {
+            format!("{} reaches below the largest level of the floor, which is left out", robot.id)
+        }));
+        below.is_none()
+    });
+    let (fixed, touching) = fixed_boxes(out, &files, &result, &robots)?;
+    let plant = PlantScene { name: "plant".into(), robots, fixed, touching, floor };
     if plant.fixed.is_empty() {
         notes.push("the result knows no space around robots: the fixed world is left out".into());
     }
     let written = request.format.write(&plant, request.package.as_deref())?;
     notes.extend(written.notes);
-    let folder = format!("{EXPORT}/{}", request.format.folder());
+    Ok((write(out, request.format, written.files, engine)?, notes))
+}
+
+/// Writes the files of a scene and removes those of an earlier one that are no part of it; returns
+/// the paths of all but meshes.
+fn write(
+    out: &Path,
+    format: SceneFormat,
+    files: Vec<SceneFile>,
+    engine: &Engine,
+) -> Result<Vec<PathBuf>> {
+    let folder = format!("{EXPORT}/{}", format.folder());
+    let place = |name: &str| without_links(out, &format!("{folder}/{name}"));
+    let list = place(LIST)?;
+    let names: BTreeSet<&str> = files.iter().map(|file| file.path.as_str()).collect();
+    let earlier = std::fs::read_to_string(&list).unwrap_or_default();
+    let is_below = |name: &str| !name.is_empty() && !name.split('/').any(|part| part == "..");
+    for name in earlier.lines().filter(|name| is_below(name) && !names.contains(name)) {
+        // What is gone or cannot be removed is no part of the new scene either way.
+        let _ = std::fs::remove_file(place(name)?);
+    }
+    let text: String = names.iter().map(|name| format!("{name}\n")).collect();
+    export::atomic::write(&list, text.as_bytes())?;
     let mut paths = Vec::new();
-    for file in written.files {
+    for file in &files {
         engine.cancel.check()?;
-        let path = without_links(out, &format!("{folder}/{}", file.path))?;
+        let path = place(&file.path)?;
         export::atomic::write(&path, &file.bytes)?;
         let is_mesh = file.path.split('/').any(|part| part == "meshes");
         paths.extend((!is_mesh).then_some(path));
     }
-    Ok((paths, notes))
+    Ok(paths)
 }
+
+/// Name of the list of a scene's files, by which the next scene knows what to remove.
+const LIST: &str = "files.txt";
 
 /// All robots that are reported.
 fn scene_robots(
@@ -140,7 +177,9 @@ fn scene_robots(
         .map(|(entry, fit)| (entry, fit.clone()))
         .unzip();
     if fits.is_empty() {
-        return Ok(Vec::new());
+        return Err(Error::bad_input("the result reports no robot, so there is no scene to write")
+            .at(request.out.display())
+            .hint("`stillpoint report OUT` tells what was found"));
     }
     let is_wanted = |name: &str| {
         let is_it = |fit: &Fit| {
@@ -155,7 +194,7 @@ fn scene_robots(
     let mut out = Vec::new();
     for (entry, fit) in entries.into_iter().zip(&fits) {
         let model = &models[fit.model];
-        is_of_the_library(entry, model, files)?;
+        is_of_the_library(entry, fit, model, files)?;
         let details = |name: &str| match bare(name) {
             Some(model) => ModelDetails::load(&dir.join(name), model, &settings),
             None => Err(Error::bad_input(format!("the library has no model \"{name}\""))),
@@ -165,12 +204,7 @@ fn scene_robots(
             own = own.with_tool(&details(&tool.model)?);
         }
         let id = &entry.id;
-        if fit.verdict != Verdict::Trusted {
-            notes.push(format!("{id} is {}: {}", fit.verdict.word(), fit.reasons.join("; ")));
-        }
-        if !fit.stays.is_empty() {
-            notes.push(format!("{id} moved between scans; it stands in the first posture"));
-        }
+        notes.extend(doubts(id, fit));
         out.push(PlantRobot {
             id: id.clone(),
             model: model.clone(),
@@ -183,8 +217,25 @@ fn scene_robots(
     Ok(out)
 }
 
-/// Refuses a model whose links, joints or meshes differ from those of the run.
-fn is_of_the_library(entry: &RobotEntry, model: &Model, files: &VerifiedFiles) -> Result<()> {
+/// What is to be known of a fit before its robot is relied upon.
+fn doubts(id: &str, fit: &Fit) -> Vec<String> {
+    let mut out = Vec::new();
+    if fit.verdict != Verdict::Trusted {
+        out.push(format!("{id} is {}: {}", fit.verdict.word(), fit.reasons.join("; ")));
+    }
+    if !fit.stays.is_empty() {
+        out.push(format!("{id} moved between scans; it stands in the first posture"));
+    }
+    out
+}
+
+/// Refuses a model whose links, joints, joint frames or meshes differ from those of the run.
+fn is_of_the_library(
+    entry: &RobotEntry,
+    fit: &Fit,
+    model: &Model,
+    files: &VerifiedFiles,
+) -> Result<()> {
     let bad = |what: &str| {
         let what = format!("the library's {} has {what} than {} has", model.name, entry.id);
         Err(Error::bad_input(what).hint("give the library of the run with --robots"))
@@ -194,6 +245,16 @@ fn is_of_the_library(entry: &RobotEntry, model: &Model, files: &VerifiedFiles) -
         || !joints.eq(entry.joints.0.iter().map(|(name, _)| name))
     {
         return bad("other links or joints");
+    }
+    let is_there = |(pose, (_, stated)): (&Pose, &(String, BasePose))| {
+        let [w, x, y, z] = stated.quat_wxyz;
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let off = Pose::from_parts(Translation3::from(stated.xyz), turn).inv_mul(pose);
+        off.translation.vector.norm() < SAME_PLACE && off.rotation.angle() < SAME_PLACE
+    };
+    let stated = &entry.link_poses.0;
+    if !poses(fit, model).iter().zip(stated).all(is_there) || stated.len() != model.links.len() {
+        return bad("other frames of joints");
     }
     for (link, file) in model.links.iter().zip(mesh_files(&entry.id, model)) {
         let Some((path, n_bytes)) = file else { continue };
@@ -207,6 +268,9 @@ fn is_of_the_library(entry: &RobotEntry, model: &Model, files: &VerifiedFiles) -
     }
     Ok(())
 }
+
+/// Deviation up to which links stand where the result says, metres or radians.
+const SAME_PLACE: f64 = 1e-6;
 
 /// Convex pieces of what hangs on each link, from the result.
 fn hanging(id: &str, model: &Model, files: &VerifiedFiles) -> Result<BTreeMap<usize, Vec<Mesh>>> {
@@ -228,8 +292,13 @@ fn hanging(id: &str, model: &Model, files: &VerifiedFiles) -> Result<BTreeMap<us
     Ok(out)
 }
 
-/// Boxes that cover the fixed voxels around all robots.
-fn fixed_boxes(out: &Path, files: &VerifiedFiles, result: &ResultFile) -> Result<Vec<FixedBox>> {
+/// Boxes that cover the fixed voxels around all robots, apart those that meet robots as found.
+fn fixed_boxes(
+    out: &Path,
+    files: &VerifiedFiles,
+    result: &ResultFile,
+    robots: &[PlantRobot],
+) -> Result<(Vec<FixedBox>, Vec<TouchingBoxes>)> {
     // Very large robots have wider voxels.
     let mut by_edge: BTreeMap<u64, BTreeSet<[i64; 3]>> = BTreeMap::new();
     for entry in result.robots.iter().filter_map(|robot| robot.space.as_ref()) {
@@ -241,7 +310,39 @@ fn fixed_boxes(out: &Path, files: &VerifiedFiles, result: &ResultFile) -> Result
             own.insert(std::array::from_fn(|i| grid.first[i] + cell[i] as i64));
         }
     }
-    Ok(by_edge.iter().flat_map(|(edge, cells)| voxel_boxes(cells, f64::from_bits(*edge))).collect())
+    let hulls = FoundHulls::of(robots);
+    let mut groups: BTreeMap<Vec<[usize; 2]>, Vec<FixedBox>> = BTreeMap::new();
+    for (edge, cells) in by_edge {
+        let edge = f64::from_bits(edge);
+        let mut by_links: BTreeMap<Vec<[usize; 2]>, BTreeSet<[i64; 3]>> = BTreeMap::new();
+        for cell in cells {
+            let center = cell.map(|v| (v as f64 + 0.5) * edge);
+            let links = hulls.met_by(&FixedBox { center, size: [edge; 3] });
+            by_links.entry(links).or_default().insert(cell);
+        }
+        for (links, cells) in by_links {
+            groups.entry(links).or_default().extend(voxel_boxes(&cells, edge));
+        }
+    }
+    let fixed = groups.remove(&[][..]).unwrap_or_default();
+    let touching = groups.into_iter().map(|(links, boxes)| TouchingBoxes { boxes, links });
+    Ok((fixed, touching.collect()))
+}
+
+/// Whether a part of the robot is clearly below the floor's rectangle, as in a pit or under a
+/// platform.
+fn reaches_below(floor: &FloorPatch, robot: &PlantRobot) -> bool {
+    /// Depth that is more than an uneven floor, metres.
+    const DEPTH: f64 = 0.1;
+    let half = floor.size.map(|edge| edge / 2.0);
+    let floor_from_world = floor.world_from_floor.inverse();
+    robot.model.links.iter().zip(robot.world_from_links()).any(|(link, world_from_link)| {
+        let floor_from_link = floor_from_world * world_from_link;
+        link.mesh.vertices.iter().any(|v| {
+            let p = floor_from_link * Point::from(v.map(f64::from));
+            p.x.abs() < half[0] && p.y.abs() < half[1] && p.z < -DEPTH
+        })
+    })
 }
 
 /// The largest level of the floor, as a rectangle around its cells.
