@@ -9,6 +9,7 @@ the crate `scene` writes scenes in drawn places and postures. SDF needs Debian's
 gltf-validator (--validator DIR with node_modules)."""
 
 import argparse
+import datetime
 import json
 import os
 import subprocess
@@ -16,19 +17,23 @@ import sys
 import tempfile
 from pathlib import Path
 
+import scene_hazards
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 # Format and reader, with the package that it comes from.
 CELLS = [
     ("urdf", "yourdfpy", "yourdfpy"), ("urdf", "pinocchio", "pin"), ("urdf", "pybullet", "pybullet"), ("urdf", "mujoco_urdf", "mujoco"),
-    ("srdf", "pinocchio", "pin"), ("moveit", "moveit", "stand-in of MoveIt's reader"), ("mjcf", "mujoco", "mujoco"), ("usd", "usd", "usd-core"), ("sdf", "sdf", "libsdformat 12"),
+    ("srdf", "pinocchio", "pin"), ("moveit", "moveit", "stand-in of MoveIt's reader"), ("mjcf", "mujoco", "mujoco"), ("usd", "usd", "usd-core"), ("sdf", "sdf", "libsdformat 12.3.0"),
     ("gltf", "gltf", "trimesh"), ("robodk", "robodk", "robodk"),
+    ("urdf", "shapes_urdf", "trimesh"), ("usd", "shapes_usd", "usd-core"), ("gltf", "shapes_gltf", "trimesh"),
 ]
 METRES = RADIANS = 1e-6
 LIMITS = 1e-9
 CLOSED = 1e-4
-# PyBullet keeps poses in single precision: 4e-6 m at 50 m from the origin, where the last robot of a library stands.
+# PyBullet calculates in single precision: 4e-6 m at 50 m from the origin, where the last robot of a library stands.
 SINGLE = {"urdf/pybullet": 5e-6}
+WHY_SINGLE = "allowed are {:.0e} m and rad: PyBullet calculates in single precision, and robots stand up to 50 m from the origin"
 VALIDATOR = """
 const v = require('gltf-validator'), fs = require('fs');
 v.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1]))).then(r => console.log(JSON.stringify(r.issues)));
@@ -71,6 +76,8 @@ def words(format, reader, found):
         numbers += f"; {found['n_limits']} joints, limits within {found['limits']:.0e}"
     if found["n_pins"]:
         numbers += f"; {found['n_pins']} pins within {found['gap']:.1e} m"
+    if max(found["metres"], found["radians"]) > METRES and not faults:
+        numbers += "; " + WHY_SINGLE.format(most)
     numbers += "".join(f"; {said}" for said in found["said"])
     return f"{'; '.join(faults)} ({numbers})" if faults else f"**right**: {numbers}"
 
@@ -92,7 +99,8 @@ def cells(name, folder, source, library, python, given):
         rows.append((name, format, package, failed or words(format, reader, found)))
         print(*rows[-1], sep=": ", flush=True)
     if given.validator:
-        rows.append((name, "gltf", "gltf-validator", validated(folder / "gltf/plant.glb", given.validator)))
+        package = json.loads((given.validator / "node_modules/gltf-validator/package.json").read_text())
+        rows.append((name, "gltf", f"gltf-validator {package['version']}", validated(folder / "gltf/plant.glb", given.validator)))
         print(*rows[-1], sep=": ", flush=True)
     return rows
 
@@ -116,17 +124,20 @@ def main():
             call = [given.stillpoint.resolve(), "export", result, "--to", format, "--robots", given.demo / "robots"]
             subprocess.run([str(c) for c in call], check=True, capture_output=True)
         rows += cells("demo", result / "export", result, given.demo / "robots", python, given)
-    for library in given.library:
-        out = given.work / library.resolve().name
+    # Models that readers and writers get wrong come from scene_hazards.py.
+    scene_hazards.write(given.work / "odd-models")
+    for library in [given.work / "odd-models", *given.library]:
+        out = given.work / "scenes" / library.resolve().name
         subprocess.run([given.example.resolve(), library, out, given.seed], check=True)
         rows += cells(library.resolve().name, out, out / "truth.json", library, python, given)
     versions = subprocess.run([python, "-m", "pip", "list", "--format=json"], capture_output=True, text=True, check=True).stdout
     versions = {p["name"]: p["version"] for p in json.loads(versions)}
-    lines = [f"| {name} | {format} | {package} {versions.get(package, '')} | {said} |" for name, format, package, said in rows]
+    lines = [f"| {name} | {format} | {f'{package} {versions.get(package, str())}'.strip()} | {said} |" for name, format, package, said in rows]
     page = HERE / "SCENES.md"
     head = page.read_text().split("<!-- table -->")[0] if page.is_file() else ""
     table = "| robots | format | read by | says |\n| --- | --- | --- | --- |\n" + "\n".join(lines)
-    page.write_text(f"{head}<!-- table -->\n\n{table}\n")
+    told = f"Run on {datetime.date.today()}, Python {sys.version.split()[0]}; `--seed {given.seed}`."
+    page.write_text(f"{head}<!-- table -->\n\n{told}\n\n{table}\n")
     sys.exit(any("**right**" not in row[3] for row in rows))
 
 

@@ -33,12 +33,27 @@ class Findings:
         """Compares what a reader takes for limits with the library's; followers without limits may have any."""
         joint = robot.joints[name]
         pairs = []
-        if joint["limits"] and (joint["limits"][0] < joint["limits"][1]):
+        # Limits of a follower that its library sets so that it cannot follow are written wider.
+        ends = joint["limits"]
+        obeys = not joint["follows"] or not ends or ends[0] - 1e-9 <= robot.values[name] <= ends[1] + 1e-9
+        if ends and ends[0] < ends[1] and obeys:
             pairs += list(zip(joint["limits"], (low, high)))
         pairs += [(joint[key], value) for key, value in (("effort", effort), ("velocity", velocity)) if joint[key] and value is not None]
         for wanted, found in pairs:
             self.limits = max(self.limits, abs(wanted - found) / max(1.0, abs(wanted)))
         self.n_limits += 1
+
+    def shape(self, name, wanted, found):
+        """Compares triangles in a link's frame: bounds, area, and volume, whose sign is that of the outside."""
+        def facts(t):
+            n = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+            return [t.min((0, 1)), t.max((0, 1)), np.linalg.norm(n, axis=1).sum() / 2, (t[:, 0] * n).sum() / 6]
+        ends = [facts(np.asarray(t, dtype=float)) for t in (wanted, found)]
+        self.metres = max(self.metres, *(float(np.abs(a - b).max()) for a, b in zip(ends[0][:2], ends[1][:2])))
+        for kind, a, b in [("area", ends[0][2], ends[1][2]), ("volume", ends[0][3], ends[1][3])]:
+            if abs(a - b) > 1e-4 * max(abs(a), 1e-3):
+                self.wrong.append(f"{name}: {kind} {b:.6f} instead of {a:.6f}")
+        self.n_links += 1
 
     def text(self):
         return json.dumps(vars(self))
@@ -166,8 +181,15 @@ def mujoco(folder, robots, names, out):
     rows = [data.efc_pos[i] for i in range(data.nefc) if data.efc_type[i] == mj.mjtConstraint.mjCNSTR_EQUALITY]
     out.gap = float(np.abs(rows).max()) if rows else 0.0
     robot_geoms = [g for g in range(model.ngeom) if model.geom_type[g] == mj.mjtGeom.mjGEOM_MESH]
-    own = sum(c.geom1 in robot_geoms and c.geom2 in robot_geoms for c in data.contact)
-    out.said.append(f"{model.nbody} bodies, {model.neq} equalities, {model.ngeom} geoms, {own} contacts between links")
+    pairs = [(c.geom1 in robot_geoms) + (c.geom2 in robot_geoms) for c in data.contact]
+    start = data.qpos.copy()
+    for _ in range(round(0.1 / model.opt.timestep)):
+        mj.mj_step(model, data)
+    moved = float(np.abs(data.qpos - start).max()) if len(start) else 0.0
+    if moved > 0.01:
+        out.wrong.append(f"a joint moves by {moved:.2g} rad or m within 0.1 s")
+    out.said.append(f"{model.nbody} bodies, {model.neq} equalities, {model.ngeom} geoms; as found {pairs.count(2)} contacts between links "
+                    f"and {pairs.count(1)} with what stands still; joints move {moved:.1e} within 0.1 s")
 
 
 def mujoco_urdf(folder, robots, names, out):
@@ -286,7 +308,69 @@ def gltf(folder, robots, names, out):
                 out.limit(robot, name, *joint["limits"], joint["effort"], joint["velocity"])
 
 
-READERS = {f.__name__: f for f in (yourdfpy, pinocchio, pybullet, moveit, mujoco, mujoco_urdf, usd, sdf, gltf, robodk)}
+def links_in_order(robot, names):
+    return [name for of, kind, name in names.all if (of, kind) == (robot.id, "link")]
+
+
+def own_meshes(robot, names, read):
+    """Triangles of each link's own mesh as the library and as a scene have them; `read` takes how the name of the mesh begins."""
+    from scene_truth import library_shapes
+
+    for name, wanted in library_shapes(robot.folder).items():
+        # A model may have another URDF for its loops.
+        if name not in robot.links:
+            continue
+        found = read(f"{links_in_order(robot, names).index(name):02}_")
+        if found is not None:
+            yield name, wanted, found
+
+
+def shapes_urdf(folder, robots, names, out):
+    import trimesh
+
+    for robot in robots:
+        def read(start):
+            paths = [p for p in (folder / robot.id / "meshes").glob(f"{start}*.stl") if "_hanging_" not in p.name]
+            return trimesh.load(paths[0], process=False).triangles if paths else None
+
+        for name, wanted, found in own_meshes(robot, names, read):
+            out.shape(f"{robot.id} {name}", wanted, found)
+
+
+def shapes_gltf(folder, robots, names, out):
+    import trimesh
+
+    scene = trimesh.load(str(folder / "plant.glb"), force="scene", process=False)
+    for robot in robots:
+        def read(start):
+            nodes = [n for n in scene.graph.nodes_geometry if n.startswith(f"{robot.id}/{start}") and "_hanging_" not in n]
+            return scene.geometry[scene.graph[nodes[0]][1]].triangles if nodes else None
+
+        for name, wanted, found in own_meshes(robot, names, read):
+            out.shape(f"{robot.id} {name}", wanted, found)
+
+
+def shapes_usd(folder, robots, names, out):
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(folder / "plant.usda"))
+    for robot in robots:
+        by_start = {f"{at:02}_": name for at, name in enumerate(links_in_order(robot, names))}
+
+        def read(start):
+            path = f"/World/{names.robot(robot.id)}/{names.link(robot.id, by_start[start])}/body_0/mesh"
+            mesh = UsdGeom.Mesh(stage.GetPrimAtPath(path))
+            if not mesh:
+                return None
+            points, corners = np.array(mesh.GetPointsAttr().Get()), np.array(mesh.GetFaceVertexIndicesAttr().Get())
+            return points[corners].reshape(-1, 3, 3)
+
+        for name, wanted, found in own_meshes(robot, names, read):
+            out.shape(f"{robot.id} {name}", wanted, found)
+
+
+READERS = {f.__name__: f for f in (yourdfpy, pinocchio, pybullet, moveit, mujoco, mujoco_urdf, usd, sdf, gltf, robodk,
+                                shapes_urdf, shapes_gltf, shapes_usd)}
 
 if __name__ == "__main__":
     reader, folder, source, library = sys.argv[1], *map(Path, sys.argv[2:5])

@@ -73,6 +73,9 @@ def robodk(folder, robots, names, out):
         def Valid(self):
             return self.valid
 
+        def Name(self):
+            return self.name
+
         def setName(self, name):
             self.name = name
 
@@ -89,7 +92,7 @@ def robodk(folder, robots, names, out):
             self.scale = scale
 
     class Robolink:
-        has_robots = True
+        station = []
 
         def AddFrame(self, name, parent=None):
             return Item(name, parent)
@@ -100,7 +103,9 @@ def robodk(folder, robots, names, out):
             return Item(path, parent)
 
         def Item(self, name, kind=None):
-            return Item(name, valid=self.has_robots)
+            """As RoboDK does: without an exact match some other one."""
+            found = [item for item in self.station if item.name == name] or self.station[:1]
+            return found[0] if found else Item(name, valid=False)
 
     stand_in = types.ModuleType("robodk.robolink")
     stand_in.Robolink, stand_in.ITEM_TYPE_ROBOT = Robolink, 2
@@ -114,21 +119,32 @@ def robodk(folder, robots, names, out):
         own[:3, 3] /= 1000
         return own if item.parent is None else world(item.parent) @ own
 
+    def linked(shown):
+        for robot in shown:
+            for item in (i for i in calls if i.name.startswith(f"{robot.id}/")):
+                out.link(robot, item.name.split("/", 1)[1], world(item))
+                if item.scale != 1000:
+                    out.wrong.append("a mesh in metres is not scaled to millimetres")
+
+    # A station with one robot of each model: of two robots of one model the second is shown by its links.
+    Robolink.station = [Item(name) for name in sorted(set(script.STATION_NAMES.values()))]
     script.main()
+    moved = {}
     for robot in robots:
-        item = next(i for i in calls if i.name == script.STATION_NAMES[robot.id] and hasattr(i, "joints"))
+        moved.setdefault(script.STATION_NAMES[robot.id], robot)
+    for name, robot in moved.items():
+        item = next(i for i in Robolink.station if i.name == name)
         base = world(item.parent)
         root = min(robot.links, key=lambda name: apart(robot.links[name], base)[0] + apart(robot.links[name], base)[1])
         out.link(robot, root, base)
         wanted = [robot.values[name] * (1000 if robot.joints[name]["type"] == "prismatic" else 180 / np.pi)
                   for name, _, _ in script.JOINTS[robot.id]]
         out.limits = max([out.limits] + [abs(w - f) for w, f in zip(wanted, item.joints, strict=True)])
-        calls.remove(item)
-    Robolink.has_robots = False
+    linked([robot for robot in robots if robot not in moved.values()])
+    # A station with some other robot, which must stay where it is.
     calls.clear()
+    Robolink.station = [Item("Another robot")]
     script.main()
-    for robot in robots:
-        for item in (i for i in calls if i.name.startswith(f"{robot.id}/")):
-            out.link(robot, item.name.split("/", 1)[1], world(item))
-            if item.scale != 1000:
-                out.wrong.append("a mesh in metres is not scaled to millimetres")
+    if Robolink.station[0].parent is not None:
+        out.wrong.append("a robot of the station that is not named was moved")
+    linked(robots)

@@ -67,6 +67,47 @@ def library_joints(folder):
     return out
 
 
+def turned(origin):
+    """A 4 by 4 matrix of an `<origin>`."""
+    xyz, rpy = ([float(v) for v in ((origin.get(k) if origin is not None else None) or "0 0 0").split()] for k in ("xyz", "rpy"))
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    out = np.eye(4)
+    out[:3, :3] = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    out[:3, 3] = xyz
+    return out
+
+
+def library_shapes(folder):
+    """Triangles (n by 3 corners by 3) of each link in its frame as the URDF says, for links of which all visuals are STL
+    meshes or boxes, read by trimesh."""
+    import trimesh
+
+    out = {}
+    for link in ET.parse(next(iter(sorted(folder.glob("robot.urdf"))))).getroot().findall("link"):
+        parts = []
+        for visual in link.findall("visual"):
+            mesh, box = visual.find("geometry/mesh"), visual.find("geometry/box")
+            if box is not None:
+                own = trimesh.creation.box([float(v) for v in box.get("size").split()]).triangles
+            elif mesh is not None and mesh.get("filename").lower().endswith(".stl") and "://" not in mesh.get("filename"):
+                scale = [float(v) for v in (mesh.get("scale") or "1 1 1").split()]
+                own = trimesh.load(folder / mesh.get("filename"), force="mesh", process=False).triangles * scale
+                if np.prod(scale) < 0:
+                    own = own[:, ::-1]
+            else:
+                break
+            at = turned(visual.find("origin"))
+            parts.append(own @ at[:3, :3].T + at[:3, 3])
+        else:
+            if parts:
+                out[link.get("name")] = np.concatenate(parts)
+    return out
+
+
 class Robot:
     """A robot as it must stand."""
 
@@ -75,6 +116,10 @@ class Robot:
         self.links = {name: pose(at) for name, at in entry["link_poses"].items()}
         self.values = values
         self.joints = library_joints(library / self.model)
+        self.folder = library / self.model
+        tool = entry.get("tool") if isinstance(entry.get("tool"), str) else (entry.get("tool") or {}).get("model")
+        for name, joint in library_joints(library / tool).items() if tool else ():
+            self.joints[f"{tool}/{name}" if name in self.joints else name] = joint
 
 
 def of_result(out, library):
