@@ -4,7 +4,7 @@
 use crate::joint_rules::JointRule;
 use crate::names::{NameMap, NameRule};
 use crate::output::{RobotToWrite, SceneFiles, body_color, fixed_color, linear, names_table};
-use crate::plant_scene::{PlantScene, box_mesh, slides};
+use crate::plant_scene::{FixedGroup, PlantScene, box_mesh, slides};
 use contract::{Error, Kind, Result};
 use geometry::{Pose, Vector};
 use robot::{JointKind, Mesh};
@@ -54,7 +54,7 @@ struct GltfFile {
 
 fn fixed(scene: &PlantScene, file: &mut GltfFile) -> Vec<usize> {
     let mut children = Vec::new();
-    for (name, boxes, links) in scene.fixed_groups() {
+    for FixedGroup { name, boxes, links } in scene.fixed_groups() {
         let about = Vector::from(boxes[0].center);
         let mesh = file.mesh(&box_mesh(boxes, &about), fixed_color(links));
         let met = links.iter().map(|&[robot, link]| {

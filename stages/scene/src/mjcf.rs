@@ -5,7 +5,7 @@ use crate::joint_rules::JointRule;
 use crate::link_pairs::link_pairs;
 use crate::names::{NameMap, NameRule};
 use crate::output::{RobotToWrite, SceneFiles, body_color, fixed_color, names_table};
-use crate::plant_scene::{FLOOR_DEPTH, LinkBody, PlantScene};
+use crate::plant_scene::{FLOOR_DEPTH, FixedGroup, LinkBody, PlantScene};
 use crate::stl::stl;
 use crate::text::{XmlText, num, nums};
 use contract::{Error, Kind, Result, quote};
@@ -105,7 +105,7 @@ fn pose_words(pose: &Pose) -> [String; 2] {
 }
 
 fn fixed(scene: &PlantScene, xml: &mut XmlText) {
-    for (name, boxes, links) in scene.fixed_groups() {
+    for FixedGroup { name, boxes, links } in scene.fixed_groups() {
         let rgba = nums(&fixed_color(links), " ");
         // Bodies are what pairs without contact are made of.
         xml.open("body", &[("name", &name)]);
@@ -203,7 +203,7 @@ fn joint(own: &RobotToWrite<'_>, j: usize, names: &NameMap, xml: &mut XmlText) {
 
 fn contacts(scene: &PlantScene, robots: &[RobotToWrite<'_>], names: &NameMap, xml: &mut XmlText) {
     xml.open("contact", &[]);
-    for (name, _, links) in scene.fixed_groups() {
+    for FixedGroup { name, links, .. } in scene.fixed_groups() {
         for &[robot, link] in links {
             xml.empty("exclude", &[("body1", &name), ("body2", names.link(robot, link))]);
         }

@@ -11,7 +11,7 @@ use crate::joint_rules::JointRule;
 use crate::link_pairs::{PairReason, link_pairs};
 use crate::names::{NameMap, NameRule};
 use crate::output::{RobotToWrite, SceneFiles, names_by_robot, names_table};
-use crate::plant_scene::{FLOOR_DEPTH, FixedBox, PlantRobot, PlantScene, size};
+use crate::plant_scene::{FLOOR_DEPTH, FixedBox, FixedGroup, PlantRobot, PlantScene, size};
 use crate::text::{XmlText, num, nums};
 use crate::urdf;
 use contract::{Result, quote};
@@ -112,7 +112,7 @@ fn touching(scene: &PlantScene, own: &RobotToWrite<'_>, names: &NameMap) -> Vec<
         "# Objects of plant.scene that meet links as found. Allow these pairs to collide, or the\n\
          # start state is refused.\nallowed:\n",
     );
-    for (name, _, links) in scene.fixed_groups() {
+    for FixedGroup { name, links, .. } in scene.fixed_groups() {
         let of_robot = links.iter().filter(|[robot, _]| *robot == own.at);
         let links: Vec<String> =
             of_robot.map(|[_, link]| quote::yaml(names.link(own.at, *link))).collect();
@@ -143,7 +143,7 @@ fn planning_scene(scene: &PlantScene, own: &PlantRobot, others: &[&RobotToWrite<
     let is_near = |middle: &Vector, radius: f64| (middle - base).norm() <= reach + radius;
     let mut text = format!("{}\n", quote::file_name(&scene.name));
     let half = |own: &FixedBox| Vector::from(own.size).norm() / 2.0;
-    for (name, boxes, _) in scene.fixed_groups() {
+    for FixedGroup { name, boxes, .. } in scene.fixed_groups() {
         let near = boxes.iter().filter(|own| is_near(&Vector::from(own.center), half(own)));
         let near: Vec<&FixedBox> = near.collect();
         if near.is_empty() {

@@ -139,12 +139,24 @@ pub(crate) fn slides(joint: &Joint) -> bool {
     joint.kind == JointKind::Prismatic
 }
 
+/// A part of what stands still.
+pub(crate) struct FixedGroup<'a> {
+    pub(crate) name: String,
+    pub(crate) boxes: &'a [FixedBox],
+    /// Robots and links that it meets as found, by their numbers.
+    pub(crate) links: &'a [[usize; 2]],
+}
+
 impl PlantScene {
-    /// What stands still in groups: each with its name, its boxes and the links that it meets.
-    pub(crate) fn fixed_groups(&self) -> Vec<(String, &[FixedBox], &[[usize; 2]])> {
-        let rest = (!self.fixed.is_empty()).then(|| ("fixed".into(), &self.fixed[..], &[][..]));
-        let touching = self.touching.iter().enumerate();
-        let touching = touching.map(|(k, t)| (format!("touching_{k}"), &t.boxes[..], &t.links[..]));
+    /// What stands still: what meets no robot as found, then each group that does.
+    pub(crate) fn fixed_groups(&self) -> Vec<FixedGroup<'_>> {
+        let rest = FixedGroup { name: "fixed".into(), boxes: &self.fixed, links: &[] };
+        let touching = self.touching.iter().enumerate().map(|(k, own)| FixedGroup {
+            name: format!("touching_{k}"),
+            boxes: &own.boxes,
+            links: &own.links,
+        });
+        let rest = (!self.fixed.is_empty()).then_some(rest);
         rest.into_iter().chain(touching).collect()
     }
 }

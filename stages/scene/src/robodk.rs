@@ -9,7 +9,9 @@
 use crate::joint_rules::JointRule;
 use crate::names::NameRule;
 use crate::output::{RobotToWrite, SceneFile, SceneFiles, names_by_robot, names_table};
-use crate::plant_scene::{FLOOR_DEPTH, FixedBox, PlantRobot, PlantScene, box_mesh, slides};
+use crate::plant_scene::{
+    FLOOR_DEPTH, FixedBox, FixedGroup, PlantRobot, PlantScene, box_mesh, slides,
+};
 use crate::stl::stl;
 use crate::text::{num, nums};
 use contract::{Result, quote};
@@ -113,7 +115,7 @@ fn links(robot: &PlantRobot, text: &mut String) {
 }
 
 fn fixed(scene: &PlantScene, text: &mut String, out: &mut SceneFiles) {
-    for (name, boxes, _) in scene.fixed_groups() {
+    for FixedGroup { name, boxes, .. } in scene.fixed_groups() {
         let about = Vector::from(boxes[0].center);
         out.add(format!("meshes/{name}.stl"), stl(&box_mesh(boxes, &about), 1.0));
         let place = pose(&Pose::from(about));

@@ -6,7 +6,7 @@ use crate::names::{NameMap, NameRule, Named};
 use crate::output::{
     RobotToWrite, SceneFile, SceneFiles, body_color, fixed_color, names_by_robot, names_table,
 };
-use crate::plant_scene::{FLOOR_DEPTH, PlantScene, box_mesh, slides};
+use crate::plant_scene::{FLOOR_DEPTH, FixedGroup, PlantScene, box_mesh, slides};
 use crate::stl::stl;
 use crate::text::{XmlText, num, nums};
 use contract::{Result, quote};
@@ -99,7 +99,7 @@ fn fixed(scene: &PlantScene, xml: &mut XmlText, out: &mut SceneFiles) {
         let what = "what stands still and meets robots as found is only seen in SDF";
         out.notes.push(format!("{what}, where no pairs can be left out: the models touching_*"));
     }
-    for (name, boxes, links) in scene.fixed_groups() {
+    for FixedGroup { name, boxes, links } in scene.fixed_groups() {
         let about = Vector::from(boxes[0].center);
         let file = format!("meshes/{name}.stl");
         out.add(&*file, stl(&box_mesh(boxes, &about), 1.0));

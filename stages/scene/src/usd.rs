@@ -12,7 +12,7 @@ use crate::names::{NameMap, NameRule, Named};
 use crate::output::{
     RobotToWrite, SceneFile, SceneFiles, body_color, fixed_color, names_by_robot, names_table,
 };
-use crate::plant_scene::{PlantScene, box_mesh, slides};
+use crate::plant_scene::{FixedGroup, PlantScene, box_mesh, slides};
 use crate::text::num;
 use crate::usd_text::{UsdText, mesh_file, point, quaternion};
 use contract::{Result, quote};
@@ -54,7 +54,7 @@ pub fn usd(scene: &PlantScene) -> Result<SceneFiles> {
 }
 
 fn fixed(scene: &PlantScene, names: &NameMap, text: &mut UsdText, out: &mut SceneFiles) {
-    for (name, boxes, links) in scene.fixed_groups() {
+    for FixedGroup { name, boxes, links } in scene.fixed_groups() {
         let about = Vector::from(boxes[0].center);
         let mesh = box_mesh(boxes, &about);
         out.add(format!("meshes/{name}.usda"), mesh_file(&mesh, fixed_color(links), "none"));
