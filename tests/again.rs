@@ -80,20 +80,25 @@ fn what_is_there_is_used_again_and_what_is_not_is_made() {
     same(&dir.join("first"), &dir.join("again"));
 
     // What is made of a result afterwards goes with it.
-    let export = |out: &str| {
+    let export_to = |out: &str, format: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
-        command.current_dir(dir).args(["export", out, "--to", "ply", "--progress", "none"]);
+        command.current_dir(dir).args(["export", out, "--to", format, "--progress", "none"]);
         command.output().expect("the program starts")
     };
+    let export = |out: &str| export_to(out, "ply");
     assert!(export("again").status.success());
+    assert!(export_to("again", "sdf").status.success());
     assert!(dir.join("again/export/fixed.ply").is_file());
     assert_eq!(export("nothing").status.code(), Some(4));
 
     // A parameter of the fit touches no tiles; a damaged store is made again.
     let refit = said(&run(dir, "again", &["--set", "fit.n_judge=300"]));
     assert!(refit.contains("tiles: 1 of 1") && !refit.contains("fits:"), "{refit}");
-    // The same points with the same labels: what was exported of them stays true.
+    // The same points with the same labels: what was exported of them stays true. A scene stays,
+    // too, and is named.
     assert!(dir.join("again/export/fixed.ply").is_file());
+    assert!(dir.join("again/export/sdf/plant.sdf").is_file());
+    assert!(refit.contains("sdf shows the earlier result"), "{refit}");
     std::fs::remove_dir_all(dir.join("again/export")).expect("removes");
     for entry in std::fs::read_dir(dir.join("again/store/tiles")).expect("a folder") {
         let path = entry.expect("an entry").path().join("catalogue.rkyv");

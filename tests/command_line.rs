@@ -36,6 +36,9 @@ fn usage_is_two() {
         &["inspect", "a.e57", "--memory", "much"],
         &["check", "a", "--trajectory", "b", "--margin", "7"],
         &["rescan", "a.e57", "--base", "b", "--out", "o", "--cell", "1,2", "--robot", "R1"],
+        &["export", "a", "--to", "ply", "--robots", "b"],
+        &["export", "a", "--to", "mjcf", "--package", "cell"],
+        &["export", "a", "--to", "urdf", "--package", "../cell"],
     ] {
         let output = stillpoint(args);
         assert_eq!(code(&output), 2, "{args:?}: {}", err(&output));
@@ -74,6 +77,9 @@ fn a_path_that_leads_nowhere_is_four_for_every_command() {
         (&["report", &empty], &empty),
         (&["export", &nosuch, "--to", "ply"], &nosuch),
         (&["export", &empty, "--to", "copc"], &empty),
+        (&["export", &nosuch, "--to", "mjcf"], &nosuch),
+        (&["export", &empty, "--to", "urdf"], &empty),
+        (&["export", &empty, "--to", "distance"], &empty),
         (&["check", &nosuch, "--trajectory", &path], &nosuch),
         (&["check", &empty, "--trajectory", &path], &empty),
         (&["check", &empty, "--trajectory", &nosuch], &nosuch),

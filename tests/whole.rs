@@ -10,6 +10,7 @@ use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
 use stillpoint::job::{FlagValues, Job, Means};
 use stillpoint::plan;
+use stillpoint::result::scene_export::{SceneFormat, SceneRequest, export_scene};
 
 /// Beams of each of the six scanners: about 30 mm apart at 5 m, an eighth of what a crew would
 /// take.
@@ -103,6 +104,75 @@ fn the_robot_is_found_and_any_number_of_threads_gives_the_same_bytes() {
     assert!(one.len() > 10, "{:?}", one.keys());
     for (name, bytes) in &one {
         assert!(two[name] == *bytes, "{} differs", name.display());
+    }
+    scenes_are_the_same_and_load(dir.path(), &robots);
+}
+
+/// Each format of scenes is written with the same bytes for any number of threads, and the URDF
+/// stands where the result says.
+fn scenes_are_the_same_and_load(dir: &Path, robots: &Path) {
+    use SceneFormat::{Gltf, Mjcf, Moveit, Robodk, Sdf, Srdf, Urdf, Usd};
+    let means = Means::of(&FlagValues::default()).expect("defaults hold");
+    for (out, threads) in [("out1", 1), ("out2", 2)] {
+        for format in [Urdf, Srdf, Moveit, Usd, Mjcf, Sdf, Gltf, Robodk] {
+            let request = SceneRequest {
+                out: dir.join(out),
+                format,
+                robots: Some(robots.to_path_buf()),
+                package: None,
+            };
+            let engine = Engine::new(threads);
+            let (written, _) = export_scene(&request, &means, &engine).expect("is written");
+            assert!(written.iter().all(|path| path.is_file()), "{written:?}");
+        }
+    }
+    let [one, two] = ["out1", "out2"].map(|out| files(&dir.join(out).join("export")));
+    assert!(one.len() > 50 && one == two);
+    let out = dir.join("out2");
+    let urdf = out.join("export/urdf/R1/robot.urdf");
+    let settings = robot::Settings::without_clouds();
+    let (model, _) = robot::Model::load_urdf(&urdf, "R1", &settings).expect("loads");
+    let result = export::ResultFile::read(&out).expect("a result");
+    let entry = &result.robots[0];
+    // Bars that follow the robot's joints follow in the URDF as well, but for one in a loop that is
+    // no line of a joint.
+    let known: std::collections::BTreeMap<&String, f64> =
+        entry.joints.0.iter().chain(&entry.passive.0).map(|(name, value)| (name, *value)).collect();
+    let free = model.free.iter().map(|&joint| &model.joints[joint].name);
+    let posture: Vec<f64> = free.map(|name| known[name]).collect();
+    assert_eq!(posture.len(), entry.joints.0.len() + 1);
+    for ((name, stated), pose) in entry.link_poses.0.iter().zip(&model.poses(&posture)[1..]) {
+        let off = (0..3).map(|i| (stated.xyz[i] - pose.translation.vector[i]).powi(2)).sum::<f64>();
+        assert!(off.sqrt() < 1e-6, "{name} is off by {} m", off.sqrt());
+    }
+    // Files of an earlier scene go when they are no part of the new one; those of others stay.
+    let folder = out.join("export/urdf");
+    std::fs::create_dir(folder.join("R9")).expect("is made");
+    for name in ["R9/robot.urdf", "mine.urdf"] {
+        std::fs::write(folder.join(name), "").expect("writes");
+    }
+    let list = std::fs::read_to_string(folder.join("files.txt")).expect("text");
+    std::fs::write(folder.join("files.txt"), list + "R9/robot.urdf\n").expect("writes");
+    let robots = Some(robots.to_path_buf());
+    let mut request = SceneRequest { out, format: Urdf, robots, package: None };
+    export_scene(&request, &means, &Engine::new(1)).expect("is written");
+    assert!(!folder.join("R9/robot.urdf").exists() && folder.join("mine.urdf").exists());
+    // Another library is refused by name.
+    let other = dir.join("other");
+    request.robots = Some(other.clone());
+    let path = other.join("demo_palletiser_2000/robot.urdf");
+    for (old, new, what) in [
+        ("joint_3\"", "joint_three\"", "other links or joints"),
+        ("xyz=\"0 0 0.38\"", "xyz=\"0.1 0 0.38\"", "other frames of joints"),
+    ] {
+        write_robots(&other).expect("the library is written");
+        let text = std::fs::read_to_string(&path).expect("text");
+        assert!(text.contains(old), "{text}");
+        std::fs::write(&path, text.replace(old, new)).expect("writes");
+        let error = export_scene(&request, &means, &Engine::new(1)).expect_err("is refused");
+        let words = error.to_string();
+        assert!(words.contains("R1") && words.contains(what), "{words}");
+        std::fs::remove_dir_all(&other).expect("is removed");
     }
 }
 

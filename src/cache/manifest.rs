@@ -190,8 +190,11 @@ impl Manifest {
         for file in old.iter().filter(|file| !stays(&file.path)) {
             remove(&out.join(&file.path))?;
         }
-        let told =
+        let mut told =
             if same_points(&old, &manifest.files) { Vec::new() } else { forget_exports(out) };
+        if digest_of(&old, RESULT) != digest_of(&manifest.files, RESULT) {
+            told.extend(old_scenes(out));
+        }
         shift(&next.join(RESULT), &out.join(RESULT))?;
         shift(&next.join(LIST), &out.join(LIST))?;
         // Only empty folders are left; the next run removes them if this fails.
@@ -257,6 +260,24 @@ fn forget_exports(out: &Path) -> Vec<String> {
     }
     let _ = std::fs::remove_dir(out.join(EXPORT));
     told
+}
+
+fn digest_of<'a>(files: &'a [OutputFile], name: &str) -> Option<&'a str> {
+    files.iter().find(|file| file.path == name).map(|file| file.digest.as_str())
+}
+
+/// A message for each scene that was exported from the earlier result. Scenes stay: somebody may
+/// have edited them.
+fn old_scenes(out: &Path) -> Vec<String> {
+    let Ok(folder) = without_links(out, EXPORT) else { return Vec::new() };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let folders = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()));
+    let mut paths: Vec<PathBuf> = folders.map(|entry| entry.path()).collect();
+    paths.sort();
+    let message = |path: PathBuf| {
+        format!("{} shows the earlier result: `stillpoint export` makes it again", path.display())
+    };
+    paths.into_iter().map(message).collect()
 }
 
 /// Compares all files of a result with its manifest; every file is read.

@@ -41,7 +41,7 @@ pub(super) enum Command {
     /// Show the summary of a result again; --junit writes its robots as test cases for a build
     /// server
     Report(ReportFlags),
-    /// Convert the points of a result to another format: COPC or PLY
+    /// Write the points of a result in another format, or its scene for planners and simulators
     Export(ExportFlags),
     /// Check whether a path of a robot keeps clear of scanned obstacles
     Check(CheckFlags),
@@ -158,10 +158,18 @@ pub(super) struct ExportFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
-    /// Format; files are written to OUT/export, and a later run into OUT removes them if the
-    /// points have changed, and reports it
+    /// Format; files are written to OUT/export. A later run into OUT removes files of points
+    /// (copc, ply) if the points have changed, and reports it; scenes stay, and those of an
+    /// earlier result are named
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: ExportFormat,
+    /// Robot library, for scenes (default: that of the run)
+    #[arg(long, value_name = "DIR")]
+    pub(super) robots: Option<PathBuf>,
+    /// ROS package in whose folder the scene will lie: mesh paths of URDFs become
+    /// package://NAME/... (default: relative paths)
+    #[arg(long, value_name = "NAME")]
+    pub(super) package: Option<String>,
 }
 
 #[derive(Debug, Args)]

@@ -13,6 +13,7 @@ use crate::result::changed_things::ThingEntry;
 use crate::result::changes::{changes, words};
 use crate::result::conversion::convert;
 use crate::result::history;
+use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
 use crate::{cache, check};
 use contract::words::count;
 use contract::{Error, Kind, Result};
@@ -53,11 +54,46 @@ pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
 }
 
 pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<u8> {
-    let engine = common.engine(&common.means()?)?;
-    let written = convert(&flags.out, flags.to, &engine)?;
+    let scene = flags.to.scene();
+    flags_fit(flags, scene)?;
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let written = match scene {
+        Some(format) => {
+            let request = SceneRequest {
+                out: flags.out.clone(),
+                format,
+                robots: flags.robots.clone(),
+                package: flags.package.clone(),
+            };
+            let (written, notes) = export_scene(&request, &means, &engine)?;
+            notes.iter().for_each(|note| say.warning(note));
+            written
+        }
+        None => convert(&flags.out, flags.to, &engine)?,
+    };
     let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
     say.result(&names.join("\n"));
     Ok(exit::OK)
+}
+
+/// Refuses flags of scenes where none of them is written, and names that no ROS package has.
+fn flags_fit(flags: &ExportFlags, scene: Option<SceneFormat>) -> Result<()> {
+    let usage = |what: String, hint: &str| Err(Error::new(Kind::Usage, what).hint(hint));
+    if scene.is_none() && flags.robots.is_some() {
+        return usage("--robots is for scenes".into(), "leave it out for this format");
+    }
+    let Some(name) = &flags.package else { return Ok(()) };
+    if !scene.is_some_and(SceneFormat::has_urdfs) {
+        let what = "--package is for formats with URDFs: urdf, srdf, moveit";
+        return usage(what.into(), "leave it out for this format");
+    }
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(fits) {
+        return Ok(());
+    }
+    let what = format!("\"{name}\" is no name of a ROS package");
+    usage(what, "a letter, then letters, digits, _ and -, as in cell_description")
 }
 
 /// Checks a path. The exit code is 0 for a path that is free apart from allowed doubts, 1 for one

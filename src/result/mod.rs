@@ -6,8 +6,10 @@ pub(crate) mod changed_things;
 pub mod changes;
 pub mod conversion;
 pub(crate) mod copc;
+pub mod distance_export;
 pub mod history;
 #[cfg(fuzzing)]
 pub(crate) mod plant_probe;
 pub(crate) mod plant_state;
 pub(crate) mod report;
+pub mod scene_export;

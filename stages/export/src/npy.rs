@@ -52,6 +52,15 @@ impl Element for i16 {
     }
 }
 
+impl Element for f32 {
+    const DESCR: &'static str = "<f4";
+    const LEN: usize = 4;
+    #[inline]
+    fn put(self, bytes: &mut [u8]) {
+        bytes.copy_from_slice(&self.to_le_bytes());
+    }
+}
+
 /// Length of magic number and header, bytes: enough for any length, and a multiple of 64 as NumPy
 /// requires.
 const HEADER: usize = 128;
@@ -150,7 +159,10 @@ impl<T: Element> NpyWriter<T> {
     }
 
     /// Finishes the file as an array of three dimensions, the last of which varies fastest.
-    pub(crate) fn finish_as(self, [x, y, z]: &[usize; 3]) -> Result<FileSum> {
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn finish_as(self, [x, y, z]: &[usize; 3]) -> Result<FileSum> {
         debug_assert_eq!(self.n, (x * y * z) as u64);
         self.end(&format!("({x}, {y}, {z})"))
     }

@@ -9,7 +9,7 @@
 
 use crate::atomic;
 use contract::{Fit, JointFit, Result, quote};
-use geometry::Pose;
+use geometry::{Pose, roll_pitch_yaw};
 use robot::{Joint, JointKind, Mesh, Model, Motion};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -115,7 +115,7 @@ fn joint(model: &Model, joint: &Joint) -> String {
 }
 
 fn origin(pose: &Pose) -> String {
-    let (p, (roll, pitch, yaw)) = (pose.translation.vector, pose.rotation.euler_angles());
+    let (p, [roll, pitch, yaw]) = (pose.translation.vector, roll_pitch_yaw(&pose.rotation));
     format!(
         "<origin xyz=\"{:.9} {:.9} {:.9}\" rpy=\"{roll:.9} {pitch:.9} {yaw:.9}\"/>",
         p.x, p.y, p.z

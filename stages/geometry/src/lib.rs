@@ -47,5 +47,5 @@ pub use evidence::Evidence;
 pub use faces::{Eye, Faces};
 pub use field::NearestField;
 pub use plane::{Moments, Plane};
-pub use pose::{Point, Pose, Vector};
+pub use pose::{Point, Pose, Vector, roll_pitch_yaw};
 pub use probe::{Probe, SurfaceSamples};

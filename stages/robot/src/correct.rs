@@ -5,7 +5,7 @@ use crate::encoding;
 use crate::settings::Settings;
 use crate::urdf::{self, has_quaternions};
 use contract::{Error, Result};
-use geometry::{Pose, Vector};
+use geometry::{Pose, Vector, roll_pitch_yaw};
 use nalgebra::{Translation3, UnitQuaternion};
 use roxmltree::{Document, Node};
 
@@ -30,8 +30,8 @@ pub fn correct(text: &str, moves: &[(String, Pose)]) -> Result<String> {
             .ok_or_else(|| Error::bad_input(format!("there is no joint '{name}'")))?;
         let origin = joint.children().find(|n| n.has_tag_name("origin"));
         let corrected = origin.map_or_else(Pose::identity, |n| pose(&n, turns)) * moved;
-        let (p, (roll, pitch, yaw)) =
-            (corrected.translation.vector, corrected.rotation.euler_angles());
+        let (p, [roll, pitch, yaw]) =
+            (corrected.translation.vector, roll_pitch_yaw(&corrected.rotation));
         let written = format!(
             "<origin xyz=\"{:.9} {:.9} {:.9}\" rpy=\"{roll:.9} {pitch:.9} {yaw:.9}\"/>",
             p.x, p.y, p.z

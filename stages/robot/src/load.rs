@@ -104,7 +104,7 @@ pub fn urdf_of(folder: &Path) -> Result<PathBuf> {
 }
 
 /// The URDF that `robot.toml` names, else `robot.urdf`, else the only URDF of the folder.
-fn urdf_in(
+pub(crate) fn urdf_in(
     folder: &Path,
     sheet: &Sheet,
     roots: &Roots,
@@ -123,7 +123,7 @@ fn urdf_in(
     }
 }
 
-fn read_sheet(
+pub(crate) fn read_sheet(
     folder: &Path,
     roots: &Roots,
     settings: &Settings,
