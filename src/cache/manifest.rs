@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 pub(super) const LIST: &str = "manifest.json";
 /// The main file of a result: the old one is removed first and the new one is moved last, so that
 /// its presence means that the files beside it belong to it.
-pub(super) const RESULT: &str = "result.json";
+pub(crate) const RESULT: &str = "result.json";
 /// Folder of files that are converted from a result afterwards; the manifest does not name them.
 pub(crate) const EXPORT: &str = "export";
 /// Name and version of the format.
