@@ -12,11 +12,13 @@ use serde::Serialize;
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
 const STYLE: &str = include_str!("../assets/page.css");
-const SCRIPTS: [&str; 8] = [
+const SCRIPTS: [&str; 10] = [
     include_str!("../assets/js/data.js"),
     include_str!("../assets/js/maths.js"),
     include_str!("../assets/js/robots.js"),
-    include_str!("../assets/js/draw.js"),
+    include_str!("../assets/js/picture.js"),
+    include_str!("../assets/js/hardware.js"),
+    include_str!("../assets/js/software.js"),
     include_str!("../assets/js/view.js"),
     include_str!("../assets/js/panel.js"),
     include_str!("../assets/js/tables.js"),

@@ -7,15 +7,17 @@ const scene = { robots, view: null, chosen: null, boxShown: false, show: () => {
 function headline() {
   const of = (word) => robots.filter((r) => r.entry.verdict === word).length;
   const all = Object.values(data.n_points).reduce((sum, v) => sum + v, 0);
-  const parts = [counted(robots.length - of("refused"), "robot"), of("doubtful") && `${of("doubtful")} doubtful`,
-    `${counted(data.scanners.length, "scan")}`, all && counted(all, "point"),
-    result.warnings.length && counted(result.warnings.length, "warning"), result.rescan && "a cell scanned again"];
+  const parts = [counted(robots.length - of("refused"), "robot"),
+    of("doubtful") && `${of("doubtful")} doubtful`, counted(data.scanners.length, "scan"),
+    all && counted(all, "point"), result.rescan && "a cell scanned again",
+    result.warnings.length && counted(result.warnings.length, "warning")];
   $("facts").textContent = parts.filter(Boolean).join(" · ");
   const links = [["#scene", "3D"], ["#robots", "Robots"], changes && ["#changes", "What changed"],
     ["#run", "How the run went"]];
   $("nav").append(...links.filter(Boolean).map(([href, name]) => el("a", { href }, name)));
   $("foot").textContent = `Made by Stillpoint ${data.program} from result.json of version ${
-    result.version}. Lengths in metres unless another unit stands beside them; deviations are one standard deviation.`;
+    result.version}. Lengths are in metres unless another unit stands beside them; ± is one standard `
+    + "deviation.";
 }
 
 /** Lines that the view draws: scanners, changed things, the section box. */
@@ -35,9 +37,19 @@ function lines() {
     { look: LOOKS.came, lines: boxes("now") }, scene.sectionLines];
 }
 
+/** Whether graphics hardware draws. `#webgl` and `#software` at the end of the address choose. */
+function hasHardware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  if (!gl || location.hash === "#software") return false;
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  return location.hash === "#webgl" || !/swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 async function start() {
   const bytes = await unpack();
   scene.cloud = decodePoints(bytes);
+  const Drawing = hasHardware() ? Hardware : Software;
   scene.drawing = new Drawing($("canvas"), scene.cloud, decodeMeshes(bytes), robots);
   scene.drawing.boxes = lines();
   scene.view = new View(scene.drawing, robots);

@@ -71,12 +71,12 @@ function robotsSection(scene) {
     }
     left.textContent = n < rows.length ? `${n} of ${rows.length}` : "";
   };
-  $("robots").append(
+  $("robots").append(...[
     el("h2", { id: "robots-title" }, `Robots: ${said.join(", ") || "none"}`),
     robots.length > 4 ? el("div", { class: "row no-print" }, search, verdict, left) : null,
     table("Robots. Places are those of their bases, metres.",
-      ["Robot", "Model", "Verdict", "#x, y, z [m]", "Joints", "#Score", "#Rms", ""], rows),
-    ...robots.map((robot) => robotDetails(scene, robot)));
+      ["Robot", "Model", "Verdict", "#x, y, z [m]", "Joints", "#Score", "#Rms", "In 3D"], rows),
+    ...robots.map((robot) => robotDetails(scene, robot))].filter(Boolean));
 }
 
 function openRobot(at) {
@@ -250,10 +250,10 @@ function changesSection(scene) {
     el("p", {}, `Compared with ${changes.base}. ${frame}`),
     table("Robots of the cell, before and now",
       ["Robot", "Model", "Now", "Base moved by", "Verdicts", "Not compared"], rows),
-    joints.length ? [el("h4", {}, "Joints that moved"),
+    joints.length ? [el("h3", {}, "Joints that moved"),
       table("Joints that moved; in the bar the red line is where it stood",
         ["Joint", "#Before", "#Now", "#Change", "Within limits"], jointRows)] : null,
-    el("h4", {}, "Other things"),
+    el("h3", {}, "Other things"),
     changes.things.length ? table("Things that are new, gone or moved; metres",
       ["Thing", "Change", "#Size [m]", "#Middle [m]", "#Moved by [m]"], things)
       : el("p", {}, "Nothing else changed as far as the new scans show."),
@@ -280,25 +280,27 @@ function runSection() {
     data.is_partial ? el("p", { class: "note" }, "Parts were left out: see the warnings.") : null,
     warnings.length ? el("ul", { class: "warnings note" }, warnings.map((w) => el("li", {}, w)))
       : el("p", {}, "No warnings."),
-    entries?.length ? [el("h4", {}, "Review"), table("What the review file did",
+    entries?.length ? [el("h3", {}, "Review"), table("What the review file did",
       ["Entry", "Effect"], entries.map((e) => el("tr", {}, el("th", { scope: "row" }, e.entry),
         cell([e.did, e.needs_look ? " – look at it again" : ""]))))] : null,
-    el("h4", {}, "Inputs"),
-    table("Files that were read", ["File", "Format", "#Size", "#Scans", "#Points", "#Dropped", "Unit", "Notes"],
-      inputs.map((input) => el("tr", {}, el("th", { scope: "row" }, input.path), cell(input.format),
+    el("h3", {}, "Inputs"),
+    table("Files that were read",
+      ["File", "Format", "#Size", "#Scans", "#Points", "#Dropped", "Unit", "Notes"],
+      inputs.map((input) => el("tr", {}, el("th", { scope: "row", class: "path" }, input.path), cell(input.format),
         cell(`${fixed(input.n_bytes / 1e6, 1)}\u00a0MB`, "num"), cell(input.n_scans, "num"),
         cell(many(input.n_points), "num"), cell(many(input.n_dropped), "num"),
         cell(input.units?.text || ""), cell((input.notes || []).join("; "))))),
-    rescan?.scans?.length ? [el("h4", {}, "Registration of the new scans"), table(
-      "How far each new scan was off, at the middle of the cell", ["Scan", "#Shift", "#Rms before", "#Rms after"],
+    rescan?.scans?.length ? [el("h3", {}, "Registration of the new scans"), table(
+      "How far each new scan was off, at the middle of the cell",
+      ["Scan", "#Shift", "#Rms before", "#Rms after"],
       rescan.scans.map((s) => el("tr", {}, el("th", { scope: "row" }, s.scan),
         cell(`${place(s.shift.map((v) => 1e3 * v), 2)} mm`, "num"), cell(millimetres(s.rms[0]), "num"),
         cell(millimetres(s.rms[1]), "num"))))] : null,
     el("div", { class: "cols" },
-      kinds.length ? el("div", {}, el("h4", {}, "Points"), table("Points of the plant by class",
+      kinds.length ? el("div", {}, el("h3", {}, "Points"), table("Points of the plant by class",
         ["Class", "#Points", "#Share"], kinds)) : null,
-      el("div", {}, el("h4", {}, "Stages"), table("What went into each stage, and what came out",
-        ["Stage", "", "#In", "#Out"], stages.map((s) => el("tr", {}, el("th", { scope: "row" }, s.name),
+      el("div", {}, el("h3", {}, "Stages"), table("What went into each stage, and what came out",
+        ["Stage", "What", "#In", "#Out"], stages.map((s) => el("tr", {}, el("th", { scope: "row" }, s.name),
           cell(said[s.name] || ""), cell(many(s.n_in), "num"), cell(many(s.n_out), "num")))))),
     data.summary ? el("details", {}, el("summary", {}, "Summary as on the terminal"),
       el("pre", {}, data.summary.split("\n").map((line) => [line, el("br")]))) : null,

@@ -4,14 +4,16 @@
 const FRAME_MS = 45;
 /** Pause after which everything is drawn, milliseconds. */
 const PAUSE_MS = 160;
-/** Points drawn at once while the view rests, so that it stays ready to move. */
+/** Time of a piece while the view rests, so that it stays ready to move, milliseconds. */
 const REST_MS = 60;
+/** Fewest points of a frame. */
+const LEAST_POINTS = 8_000;
 
 class View {
   constructor(drawing, robots) {
     Object.assign(this, { drawing, robots, canvas: drawing.canvas, yaw: -0.9, pitch: 0.6,
-      away: 20, target: [0, 0, 0], budget: drawing.isSoftware ? 60_000 : 1_200_000, lastMove: 0,
-      rest: null, isAsleep: true, frames: [], chosen: null, labels: [] });
+      away: 20, target: [0, 0, 0], budget: drawing.isSlow ? 150_000 : 1_200_000, lastMove: 0, lastFrame: 0,
+      rest: null, isAsleep: true, chosen: null, labels: [] });
     this.measure();
     this.addLabels();
     this.listen();
@@ -64,7 +66,7 @@ class View {
     this.target = low.map((v, i) => (v + high[i]) / 2);
     this.target[2] = low[2] + 0.25 * (high[2] - low[2]);
     const aspect = Math.min(1, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight) * 0.8);
-    this.away = 0.95 * Math.hypot(high[0] - low[0], high[1] - low[1]) / aspect + 1;
+    this.away = 0.8 * Math.hypot(high[0] - low[0], high[1] - low[1]) / aspect + 1;
     [this.yaw, this.pitch] = [-0.9, 0.72];
     this.wake();
   }
@@ -76,11 +78,12 @@ class View {
 
   /** Looks at a robot. */
   focus(robot) {
+    this.chosen = robot;
     const at = robot.tree ? robot.poses.map((m) => m.slice(12, 15)) : [robot.base.slice(12, 15)];
     const low = [0, 1, 2].map((k) => Math.min(...at.map((p) => p[k])));
     const high = [0, 1, 2].map((k) => Math.max(...at.map((p) => p[k])));
     this.target = low.map((v, k) => (v + high[k]) / 2);
-    this.away = 2.1 * Math.hypot(...minus(high, low)) + 1.6;
+    this.away = 1.6 * Math.hypot(...minus(high, low)) + 1.2;
     if (this.pitch > 1.2) this.pitch = 0.5;
     this.wake();
   }
@@ -116,83 +119,78 @@ class View {
   }
 
   tick() {
-    if (performance.now() - this.lastMove < PAUSE_MS || !this.canvas.clientWidth) {
-      if (this.canvas.clientWidth) this.quick();
-    } else if (this.slow()) {
+    if (!this.canvas.clientWidth) {
       this.isAsleep = true;
       return;
     }
-    requestAnimationFrame(() => this.tick());
-  }
-
-  fitCanvas() {
-    const [w, h] = this.size(Math.min(2, window.devicePixelRatio || 1));
-    if (this.canvas.width !== w || this.canvas.height !== h) {
-      Object.assign(this.canvas, { width: w, height: h });
-    }
-    return [w, h];
-  }
-
-  /** A frame while the view moves, within its time. */
-  quick() {
     const from = performance.now();
-    const isPoor = this.budget < 400_000;
+    const isMoving = from - this.lastMove < PAUSE_MS;
+    const step = isMoving ? this.quick() : this.slow();
+    this.drawing.whenDrawn(from, (took) => {
+      if (step(took)) this.isAsleep = true;
+      else requestAnimationFrame(() => this.tick());
+    });
+  }
+
+  /** A frame while the view moves, within its time; what follows from the time that it took. */
+  quick() {
+    const { drawing } = this;
+    const isPoor = drawing.isSlow || this.budget < 400_000;
     const ratio = Math.min(2, window.devicePixelRatio || 1);
     const [w, h] = this.size(isPoor ? 0.6 : ratio);
     const camera = this.camera();
-    this.fitCanvas();
-    const { drawing } = this;
-    drawing.open(drawing.targets.moving, w, h);
-    drawing.clear();
     const focal = this.focal(h);
+    drawing.begin("moving", w, h);
     const { rows, total } = drawing.within(drawing.visible(camera), focal, this.budget);
-    drawing.drawRobots(camera, isPoor);
-    drawing.drawPoints(rows, camera, focal, isPoor ? 5 : 8);
-    drawing.drawLines(camera);
-    drawing.show(drawing.targets.moving, isPoor ? 0 : 0.9);
+    drawing.addPoints("moving", rows, camera, focal, isPoor ? 4 : 8);
+    drawing.finish("moving", camera, focal, isPoor);
+    drawing.show("moving", 0.9);
     this.overlay(camera);
-    drawing.settle();
-    const took = performance.now() - from;
-    this.frames.push(took);
-    this.budget = clamp(this.budget * clamp(FRAME_MS / took, 0.6, 1.25), 15_000, 6_000_000);
-    this.say(total, took);
+    const now = performance.now();
+    const apart = now - this.lastFrame;
+    this.lastFrame = now;
+    return (took) => {
+      const by = clamp(FRAME_MS / took, 0.6, 1.25);
+      this.budget = clamp(this.budget * by, LEAST_POINTS, 6_000_000);
+      if (apart < 1000) this.say(total, apart);
+      return false;
+    };
   }
 
-  /** Draws on with everything; whether it is done. */
+  /** A piece of everything; whether it was the last one. */
   slow() {
     const { drawing } = this;
-    const [w, h] = this.fitCanvas();
-    const target = drawing.targets.resting;
+    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    const [w, h] = this.size(ratio);
     const focal = this.focal(h);
-    drawing.open(target, w, h);
     if (!this.rest) {
       const camera = this.camera();
       const { rows, total } = drawing.chosen(drawing.visible(camera), focal, 0.6);
       this.rest = { camera, rows, total, at: 0, n: 20_000 };
-      drawing.clear();
-      drawing.drawRobots(camera, false);
-      drawing.drawLines(camera);
+      drawing.begin("resting", w, h);
       this.say(total, 0);
     }
     const { rest } = this;
-    const from = performance.now();
     const now = [];
     for (let n = 0; n < rest.n && rest.at < rest.rows.length; rest.at++) {
       now.push(rest.rows[rest.at]);
       n += rest.rows[rest.at].n;
     }
-    drawing.drawPoints(now, rest.camera, focal, 6 * h / this.canvas.clientHeight);
-    drawing.settle();
-    const took = performance.now() - from;
-    rest.n = clamp(rest.n * clamp(REST_MS / took, 0.5, 2), 10_000, 5_000_000);
-    if (rest.at < rest.rows.length) return false;
-    drawing.show(target, 1.1);
-    this.overlay(rest.camera);
-    drawing.settle();
-    this.say(rest.total, 0, true);
-    document.documentElement.dataset.drawn = String(rest.total);
-    this.rest = null;
-    return true;
+    drawing.addPoints("resting", now, rest.camera, focal, 6 * ratio);
+    const isLast = rest.at >= rest.rows.length;
+    if (isLast) {
+      drawing.finish("resting", rest.camera, focal, false);
+      drawing.show("resting", 1.1);
+      this.overlay(rest.camera);
+    }
+    return (took) => {
+      rest.n = clamp(rest.n * clamp(REST_MS / took, 0.5, 2), 10_000, 5_000_000);
+      if (!isLast || this.rest !== rest) return false;
+      this.rest = null;
+      this.say(rest.total, 0, true);
+      document.documentElement.dataset.drawn = String(rest.total);
+      return true;
+    };
   }
 
   say(n, took, isDone = false) {

@@ -1,29 +1,4 @@
-// Draws points, bodies and lines with WebGL 2. Points of a block stand by level, coarse to fine, so
-// that any number of levels is an even thinning of it.
-
-/** What the view can show: colour, and whether it is shown at first. */
-const LOOKS = {
-  fixed: { name: "Fixed", color: [0.62, 0.66, 0.70], on: true, kind: "fixed" },
-  floor: { name: "Floor", color: [0.42, 0.46, 0.50], on: true, kind: "floor" },
-  uncertain: { name: "Uncertain, counts as fixed", color: [0.95, 0.85, 0.30], on: true,
-    kind: "uncertain" },
-  unknown: { name: "Edge of unseen space near robots", color: [0.36, 0.30, 0.55], on: false },
-  link: { name: "Robots, points", color: [0.55, 0.82, 1.0], on: true, kind: "link" },
-  attached: { name: "Attached to robots, points", color: [0.92, 0.45, 0.75], on: true,
-    kind: "attachment" },
-  trusted: { name: "Robots, trusted", color: [0.20, 0.56, 0.87], on: true },
-  doubtful: { name: "Robots, doubtful", color: [0.93, 0.62, 0.10], on: true },
-  hanging: { name: "Attached bodies", color: [0.80, 0.33, 0.62], on: true },
-  before: { name: "Robots before the rescan", color: [0.93, 0.27, 0.25], on: true },
-  gone: { name: "Gone or moved away", color: [0.93, 0.27, 0.25], on: true },
-  came: { name: "New or moved here", color: [0.16, 0.78, 0.50], on: true },
-  scanner: { name: "Scanners", color: [1.0, 1.0, 1.0], on: true },
-};
-/** Looks of points, by the number that the shader knows them by. */
-const POINT_LOOKS = ["fixed", "floor", "uncertain", "unknown", "link", "attached"];
-const FIELD = 0.9;
-const NEAREST = 0.05;
-const FARTHEST = 2000;
+// Draws with graphics hardware, by WebGL 2.
 
 const POINT_SHADER = `
 in uvec4 a;
@@ -47,7 +22,7 @@ void main() {
 #endif
   vec4 c = u_look[look];
   gl_Position = u_clip * p;
-  gl_PointSize = clamp(u_size / gl_Position.w, 1.0, u_cap);
+  gl_PointSize = clamp(u_size / gl_Position.w * (look == 2 || look == 4 ? 0.6 : 1.0), 1.0, u_cap);
   if (c.a < 0.5 || any(lessThan(p.xyz, u_low)) || any(greaterThan(p.xyz, u_high)))
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   v_color = c.rgb * clamp(0.66 + 0.34 * (p.z - u_tone.x) * u_tone.y, 0.55, 1.0);
@@ -81,7 +56,7 @@ void main() {
   vec3 look = normalize(u_eye - v_at);
   if (dot(n, look) < 0.0) n = -n;
   float light = 0.42 + 0.38 * dot(n, look) + 0.20 * max(0.0, n.z) + 0.1 * n.x;
-  color = vec4(u_color.rgb * light, 1.0);
+  color = vec4(u_color.rgb * (u_color.a < 1.0 ? 1.0 + 0.4 * light : light), 1.0);
 }`;
 const LINE_SHADER = `
 in vec3 a;
@@ -148,18 +123,14 @@ class Target {
   }
 }
 
-class Drawing {
+class Hardware extends Picture {
   constructor(canvas, cloud, meshes, robots) {
+    super(canvas, cloud, meshes, robots);
     const gl = canvas.getContext("webgl2", { antialias: false, depth: false, alpha: false,
       preserveDrawingBuffer: true, powerPreference: "high-performance" });
-    if (!gl) throw new Error("this browser shows no WebGL 2");
     const links = Math.max(1, ...robots.filter((r) => r.tree).map((r) => r.tree.links.length));
     const room = Math.floor((gl.getParameter(gl.MAX_VERTEX_UNIFORM_VECTORS) - 24) / 3);
-    const info = gl.getExtension("WEBGL_debug_renderer_info");
-    const renderer = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
-    Object.assign(this, { canvas, gl, cloud, robots, renderer, nLinks: Math.min(links, room),
-      low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9], tone: [0, 0.1], boxes: [] });
-    this.isSoftware = /swiftshader|llvmpipe|software|basic render/i.test(renderer);
+    Object.assign(this, { gl, nLinks: Math.min(links, room), isSlow: false });
     const define = `#define LINKS ${this.nLinks}\n`;
     this.stillProgram = this.program(POINT_SHADER, PLAIN_SHADER);
     this.movingProgram = this.program("#define MOVES\n" + define + POINT_SHADER, PLAIN_SHADER);
@@ -167,7 +138,7 @@ class Drawing {
     this.lineProgram = this.program(LINE_SHADER, PLAIN_SHADER);
     this.shadeProgram = this.program(COVER_SHADER, SHADE_SHADER);
     this.pointArray = this.vertexArray(cloud.points);
-    this.meshes = meshes.map((mesh) => this.addMesh(mesh));
+    this.meshes.forEach((mesh) => this.addMesh(mesh));
     this.lineBuffer = gl.createBuffer();
     this.lineArray = gl.createVertexArray();
     gl.bindVertexArray(this.lineArray);
@@ -213,93 +184,32 @@ class Drawing {
     return array;
   }
 
-  /** A body with a coarse form of itself, for while the view moves. */
+  /** Corners of a body, then those of its coarse form. */
   addMesh(mesh) {
     const { gl } = this;
-    const array = this.vertexArray(mesh.vertices);
-    const cell = 0.04 / mesh.scale;
-    const known = new Map();
-    const first = [];
-    for (let i = 0; i < mesh.n_vertices; i++) {
-      const key = [3, 0, 1, 2].map((k) => k === 3 ? mesh.vertices[4 * i + 3]
-        : Math.round(mesh.vertices[4 * i + k] / cell)).join();
-      if (!known.has(key)) known.set(key, i);
-      first.push(known.get(key));
-    }
-    const coarse = [];
-    for (let i = 0; i < mesh.corners.length; i += 3) {
-      const [a, b, c] = [0, 1, 2].map((k) => first[mesh.corners[i + k]]);
-      if (a !== b && b !== c && a !== c) coarse.push(a, b, c);
-    }
-    const buffer = gl.createBuffer();
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array([...mesh.corners, ...coarse]),
-      gl.STATIC_DRAW);
-    return { ...mesh, array, n: mesh.corners.length, nCoarse: coarse.length };
+    mesh.array = this.vertexArray(mesh.vertices);
+    const all = new Uint32Array(mesh.corners.length + mesh.coarse.length);
+    all.set(mesh.corners);
+    all.set(mesh.coarse, mesh.corners.length);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, all, gl.STATIC_DRAW);
   }
 
-  /** Blocks within the field of view: distance, and how many points each level has. */
-  visible(camera) {
-    const out = [];
-    for (const block of this.cloud.blocks) {
-      const looks = block.owner >= 0 ? [4, 5] : block.owner === -2 ? [3] : [0, 1, 2];
-      if (!looks.some((i) => LOOKS[POINT_LOOKS[i]].on)) continue;
-      const robot = block.owner >= 0 ? this.robots[block.owner] : null;
-      const low = block.corner, high = block.corner.map((v) => v + block.edge);
-      const isMoved = robot?.tree && robot.poses !== robot.foundPoses;
-      if (!isMoved && (low.some((v, i) => v > this.high[i]) || high.some((v, i) => v < this.low[i])
-        || isOutside(camera.clip, low, high))) continue;
-      const nearest = camera.eye.map((v, i) => clamp(v, low[i], high[i]));
-      const away = Math.max(0.4, Math.hypot(...minus(camera.eye, nearest)));
-      out.push({ block, away, robot });
-    }
-    return out.sort((a, b) => a.away - b.away);
-  }
-
-  /** How many points of each visible block to draw, so that neighbours are `spacing` pixels apart. */
-  chosen(visible, focal, spacing) {
-    let total = 0;
-    const rows = visible.map((entry) => {
-      const { block, away } = entry;
-      let n = 0, size = 0;
-      for (let k = 0; k < block.counts.length; k++) {
-        const edge = block.edge / 1024 * 2 ** (view.coarsest - k);
-        n += block.counts[k];
-        if (block.counts[k]) size = Math.max(edge, block.edge / 1024 * 2 ** block.shift);
-        if (edge * focal / away < spacing) break;
-      }
-      total += n;
-      return { ...entry, n, size };
-    });
-    return { rows, total };
-  }
-
-  /** The finest spacing with no more than so many points. */
-  within(visible, focal, most) {
-    let [fine, coarse] = [0.5, 400];
-    let best = this.chosen(visible, focal, coarse);
-    const all = this.chosen(visible, focal, fine);
-    if (all.total <= most) return all;
-    for (let i = 0; i < 12; i++) {
-      const middle = Math.sqrt(fine * coarse);
-      const tried = this.chosen(visible, focal, middle);
-      if (tried.total > most) fine = middle; else { coarse = middle; best = tried; }
-    }
-    return best;
-  }
-
-  open(target, width, height) {
+  /** Begins a picture: then points, in one or several pieces, then all else. */
+  begin(name, width, height) {
     const { gl } = this;
+    const target = this.targets[name];
     target.fit(width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
-    gl.viewport(0, 0, width, height);
-    gl.enable(gl.DEPTH_TEST);
-  }
-
-  clear() {
-    const { gl } = this;
     gl.clearColor(0, 0, 0, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  }
+
+  open({ frame, width, height }) {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+    gl.viewport(0, 0, width, height);
+    gl.enable(gl.DEPTH_TEST);
   }
 
   use(program, camera) {
@@ -322,8 +232,9 @@ class Drawing {
     this.gl.uniform4fv(at.u_links, rows);
   }
 
-  drawPoints(rows, camera, focal, cap) {
+  addPoints(name, rows, camera, focal, cap) {
     const { gl } = this;
+    this.open(this.targets[name]);
     const looks = new Float32Array(POINT_LOOKS.flatMap((name) =>
       [...LOOKS[name].color, LOOKS[name].on ? 1 : 0]));
     gl.bindVertexArray(this.pointArray);
@@ -344,41 +255,28 @@ class Drawing {
         }
         gl.uniform3fv(at.u_corner, row.block.corner);
         gl.uniform1f(at.u_step, row.block.edge / 1024);
-        gl.uniform1f(at.u_size, row.size * focal * 1.15);
+        gl.uniform1f(at.u_size, row.size * focal * 1.5);
         gl.drawArrays(gl.POINTS, row.block.first, row.n);
       }
     }
   }
 
-  drawRobots(camera, isCoarse) {
+  finish(name, camera, focal, isQuick) {
     const { gl } = this;
+    this.open(this.targets[name]);
     const at = this.use(this.meshProgram, camera);
     gl.uniform3fv(at.u_eye, camera.eye);
-    for (const robot of this.robots) {
-      if (!robot.tree || robot.entry.verdict === "refused") continue;
-      const look = LOOKS[robot.entry.verdict] || LOOKS.doubtful;
-      if (look.on) this.drawMesh(at, robot.body.mesh, robot.poses, look.color, 1, isCoarse);
-      if (LOOKS.hanging.on) {
-        this.drawMesh(at, robot.body.hanging, robot.poses, LOOKS.hanging.color, 1, isCoarse);
-      }
-      if (robot.before && LOOKS.before.on) {
-        this.drawMesh(at, robot.body.mesh, robot.before, LOOKS.before.color, 0.5, isCoarse);
-      }
+    for (const body of this.bodies(camera, focal, isQuick)) {
+      const { mesh, isCoarse, matrices, color, alpha } = body;
+      this.links(at, matrices);
+      gl.uniform3fv(at.u_min, mesh.min);
+      gl.uniform1f(at.u_scale, mesh.scale);
+      gl.uniform4fv(at.u_color, [...color, alpha]);
+      gl.bindVertexArray(mesh.array);
+      gl.drawElements(gl.TRIANGLES, isCoarse ? mesh.coarse.length : mesh.corners.length,
+        gl.UNSIGNED_INT, isCoarse ? 4 * mesh.corners.length : 0);
     }
-  }
-
-  drawMesh(at, number, matrices, color, alpha, isCoarse) {
-    if (number === null || number === undefined) return;
-    const { gl } = this;
-    const mesh = this.meshes[number];
-    const pick = isCoarse && mesh.nCoarse > 60;
-    this.links(at, matrices);
-    gl.uniform3fv(at.u_min, mesh.min);
-    gl.uniform1f(at.u_scale, mesh.scale);
-    gl.uniform4fv(at.u_color, [...color, alpha]);
-    gl.bindVertexArray(mesh.array);
-    gl.drawElements(gl.TRIANGLES, pick ? mesh.nCoarse : mesh.n, gl.UNSIGNED_INT,
-      pick ? 4 * mesh.n : 0);
+    this.drawLines(camera);
   }
 
   /** Lines: lists of places in the view's frame, two for each line. */
@@ -396,8 +294,11 @@ class Drawing {
   }
 
   /** Brings what was drawn to the canvas. */
-  show(target, shade) {
-    const { gl, canvas } = this;
+  show(name, shade) {
+    const { gl, canvas, targets: { [name]: target } } = this;
+    if (canvas.width !== target.width || canvas.height !== target.height) {
+      Object.assign(canvas, { width: target.width, height: target.height });
+    }
     const at = this.shadeProgram.at;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
@@ -416,30 +317,20 @@ class Drawing {
     gl.activeTexture(gl.TEXTURE0);
   }
 
-  /** Waits until all is drawn. */
-  settle() {
-    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+  /** Calls `done` with the time that the drawing took since `from`, once it is finished. */
+  whenDrawn(from, done) {
+    const { gl } = this;
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    const look = () => {
+      if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED && !gl.isContextLost()) {
+        setTimeout(look, 1);
+        return;
+      }
+      gl.deleteSync(fence);
+      done(performance.now() - from);
+    };
+    setTimeout(look, 0);
   }
 }
 
-/** Whether a box lies outside of one side of the field of view. */
-function isOutside(clip, low, high) {
-  const corners = [];
-  for (let i = 0; i < 8; i++) {
-    const p = [i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2], 1];
-    corners.push([0, 1, 2, 3].map((r) =>
-      clip[r] * p[0] + clip[4 + r] * p[1] + clip[8 + r] * p[2] + clip[12 + r]));
-  }
-  return [0, 1].some((i) => corners.every((c) => c[i] > c[3]) || corners.every((c) => c[i] < -c[3]))
-    || corners.every((c) => c[3] < NEAREST);
-}
-
-/** The twelve edges of a box, as places of lines. */
-function boxLines(low, high) {
-  const corner = (i) => [i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]];
-  const out = [];
-  for (let i = 0; i < 8; i++) {
-    for (const bit of [1, 2, 4]) if (!(i & bit)) out.push(corner(i), corner(i | bit));
-  }
-  return out;
-}
