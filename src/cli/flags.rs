@@ -234,7 +234,8 @@ pub(super) struct ReportFlags {
     /// Write each robot as a test case to this JUnit file: trusted ones pass
     #[arg(long, value_name = "FILE")]
     pub(super) junit: Option<PathBuf>,
-    /// Write OUT/report.html: the plant in 3D with tables, one file that any browser shows offline
+    /// Write OUT/report.html: the plant in 3D with tables, one file that any browser shows offline;
+    /// a later run into OUT removes it if the result has changed, and reports it
     #[arg(long)]
     pub(super) html: bool,
     /// Print the data of that page as JSON

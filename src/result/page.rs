@@ -2,7 +2,7 @@
 //! hands them to the stage that writes pages.
 
 use super::plant_state::PlantState;
-use crate::cache::{RESULT, VerifiedFiles};
+use crate::cache::{PAGE, RESULT, VerifiedFiles};
 use crate::detect::library;
 use crate::detect::robots::RobotList;
 use crate::engine::{Amount, Engine};
@@ -12,15 +12,10 @@ use contract::{Error, Fit, Result, Verdict};
 use export::{BasePose, ResultFile, RobotEntry, WrittenBodies, read_tile};
 use geometry::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use report_page::{
-    PageLoop, PagePoint, PagePoints, PageRobot, PageScanner, PageTexts, ReportPage,
-};
+use report_page::{PageLoop, PagePoint, PagePoints, PageRobot, PageScanner, PageTexts, ReportPage};
 use robot::Model;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-
-/// Name of the page.
-pub(crate) const PAGE: &str = "report.html";
 
 /// A published result of which a page is made.
 pub(crate) struct ReportedResult<'a> {

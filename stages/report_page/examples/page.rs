@@ -71,7 +71,8 @@ fn add_tile(tile: &Path, points: &mut report_page::PagePoints) {
     while reader.fill_points(1 << 16, &mut piece).expect("reads") > 0 {
         let extra = piece.record_len() - usize::from(piece.format().extra_bytes);
         let of_record = |record: &[u8]| {
-            let number = |at: usize| u16::from_le_bytes([record[extra + at], record[extra + at + 1]]);
+            let number =
+                |at: usize| u16::from_le_bytes([record[extra + at], record[extra + at + 1]]);
             [number(0), number(2)].map(|n| n.wrapping_sub(1) as i16)
         };
         let owners = piece.raw_bytes().chunks_exact(piece.record_len()).map(of_record);

@@ -228,10 +228,8 @@ impl PagePoints {
                 let goes = |at: usize| {
                     is_last(key, block, &level, at) && scatter(!block.entries[at]) < below
                 };
-                let stays: Vec<u64> = (0..level.len())
-                    .filter(|&at| !goes(at))
-                    .map(|at| block.entries[at])
-                    .collect();
+                let stays: Vec<u64> =
+                    (0..level.len()).filter(|&at| !goes(at)).map(|at| block.entries[at]).collect();
                 block.entries = stays;
             }
         }
@@ -270,8 +268,7 @@ impl Block {
         for bounds in near.iter().filter(|b| owner == Owner::Still && b.touches(&whole)) {
             for n in 0..512_u32 {
                 let [x, y, z] = [n & 7, n >> 3 & 7, n >> 6];
-                let min: [f64; 3] =
-                    [0, 1, 2].map(|i| corner[i] + f64::from([x, y, z][i]) * cell);
+                let min: [f64; 3] = [0, 1, 2].map(|i| corner[i] + f64::from([x, y, z][i]) * cell);
                 let own = Aabb { min, max: min.map(|v| v + cell) };
                 cells[join([x, y, z]) as usize] |= bounds.touches(&own);
             }

@@ -37,7 +37,8 @@ mod tests {
         for steps in [[0, 0, 0], [1, 2, 3], [1023, 0, 512], [341, 682, 1023]] {
             let place = join(steps);
             for (axis, step) in steps.into_iter().enumerate() {
-                let back: u32 = (0..AXIS_BITS).map(|b| (place >> (3 * b + axis as u32) & 1) << b).sum();
+                let back: u32 =
+                    (0..AXIS_BITS).map(|b| (place >> (3 * b + axis as u32) & 1) << b).sum();
                 assert_eq!(step, back);
             }
             assert_eq!(place >> 6, join(steps.map(|s| s >> 2)), "a voxel of four steps");

@@ -23,7 +23,8 @@ fn texts(name: &str) -> PageTexts {
 
 fn arm(name: &str) -> robot::Model {
     let vertices = vec![[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]];
-    let mesh = robot::Mesh { vertices, triangles: vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]] };
+    let mesh =
+        robot::Mesh { vertices, triangles: vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]] };
     let link = robot::Link {
         name: name.into(),
         role: robot::Role::Main,
@@ -126,7 +127,8 @@ fn points_come_back_where_they_were() {
                         break;
                     }
                 }
-                let step = |axis: u32| (0..10).map(|b| (place >> (3 * b + axis) & 1) << b).sum::<u32>();
+                let step =
+                    |axis: u32| (0..10).map(|b| (place >> (3 * b + axis) & 1) << b).sum::<u32>();
                 places.push([0, 1, 2].map(|i| {
                     (f64::from(step(i as u32)) + 0.5) / 1024.0 * 6.4 + 6.4 * number(1 + i) as f64
                 }));
@@ -150,7 +152,8 @@ fn a_large_hall_is_a_page_of_bounded_length_and_equal_bytes() {
         [of(0), of(1), of(2) * 0.1]
     };
     for part in 0..12_u64 {
-        let some = (0..300_000).map(|k| PagePoint { world: at(part * 300_000 + k), label: Label::FIXED });
+        let some =
+            (0..300_000).map(|k| PagePoint { world: at(part * 300_000 + k), label: Label::FIXED });
         points.add(&some.collect::<Vec<_>>());
         points.settle();
         assert!(points.n_points() <= 2 * MOST_POINTS);
