@@ -42,13 +42,12 @@ impl<'a> ReportedResult<'a> {
         Ok(Self { out, files, result, state, means, engine })
     }
 
-    /// The data of the page as JSON, without points: counts of classes are 0.
+    /// The data of the page as JSON, without points.
     ///
     /// # Errors
     /// A file that is missing or was changed.
     pub(crate) fn data(&self) -> Result<String> {
-        let page = ReportPage::new(self.texts()?, self.scanners());
-        page.data(&page.points())
+        ReportPage::new(self.texts()?, self.scanners()).data(None)
     }
 
     /// Writes the page and returns its path.

@@ -50,8 +50,8 @@ const NEAR: f64 = 0.6;
 const TAG_BITS: u32 = 16;
 /// Points that may wait in a block until they are thinned.
 const WAITING: usize = 1 << 15;
-/// The coarsest voxels that levels begin with: 64 steps, 0.4 m of what stands still.
-pub(crate) const COARSEST: u32 = 6;
+/// The coarsest voxels that levels begin with: 128 steps, 0.8 m of what stands still.
+pub(crate) const COARSEST: u32 = 7;
 
 /// Voxels of which one point is kept, as shifts along an axis: how many times a step is doubled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -205,35 +205,32 @@ impl PagePoints {
         }
     }
 
-    /// The blocks with their points by level, and no more than `most` points: of the finest level
-    /// away from robots only a part stays where there are more.
+    /// The blocks with their points by level, and about `most` points: where there are more, the
+    /// finest levels of what stands still go, away from robots first, the last of them in part.
     pub(crate) fn finish(&self, most: usize) -> Vec<(BlockKey, LeveledBlock)> {
         let mut all = self.clone_settled(most);
-        let n = all.n_points();
-        if n > most {
-            let fineness = LADDER[all.rung];
-            let is_last = |key: &BlockKey, block: &Block, level: &[u8], at: usize| {
-                let shift = block.shift(key.0, fineness, block.entries[at]);
-                key.0 == Owner::Still && u32::from(level[at]) == shift
-            };
-            let mut n_last = 0;
+        let fineness = LADDER[all.rung];
+        if let Some(mut left) = all.n_points().checked_sub(most).filter(|n| *n > 0) {
+            let mut of_rank = [0_usize; 2 * COARSEST as usize];
             for (key, block) in &all.blocks {
-                let level = block.levels();
-                n_last += (0..level.len()).filter(|&at| is_last(key, block, &level, at)).count();
+                block.ranks(key.0, fineness).flatten().for_each(|rank| of_rank[rank] += 1);
             }
-            let share = (n - most).min(n_last) as f64 / n_last.max(1) as f64;
-            let below = (share * u64::MAX as f64) as u64;
+            let goes_of_rank = of_rank.map(|n| {
+                let goes = left.min(n);
+                left -= goes;
+                (goes as f64 / n.max(1) as f64 * u64::MAX as f64) as u64
+            });
             for (key, block) in &mut all.blocks {
-                let level = block.levels();
-                let goes = |at: usize| {
-                    is_last(key, block, &level, at) && scatter(!block.entries[at]) < below
-                };
-                let stays: Vec<u64> =
-                    (0..level.len()).filter(|&at| !goes(at)).map(|at| block.entries[at]).collect();
-                block.entries = stays;
+                let goes: Vec<u64> = block
+                    .ranks(key.0, fineness)
+                    .map(|rank| rank.map_or(0, |rank| goes_of_rank[rank]))
+                    .collect();
+                let mut goes = goes.into_iter();
+                block
+                    .entries
+                    .retain(|entry| goes.next().is_none_or(|goes| scatter(!entry) >= goes));
             }
         }
-        let fineness = LADDER[all.rung];
         let full = all.blocks.into_iter().filter(|(_, block)| !block.entries.is_empty());
         full.map(|(key, block)| (key, block.leveled(key.0, fineness))).collect()
     }
@@ -250,11 +247,12 @@ impl PagePoints {
 /// The points of a block by level, each level a thinning of the block with those before it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LeveledBlock {
-    /// Number of points of each level, from voxels of 64 steps to single steps.
+    /// Number of points of each level, from voxels of 128 steps to single steps.
     pub(crate) counts: [u32; COARSEST as usize + 1],
     /// Place and tag, by level, then by place.
     pub(crate) points: Vec<(u32, u16)>,
-    /// Shift of the voxels of which most of its points are the only ones.
+    /// Shift of the largest voxels of which a tenth of its points or more are the only ones: as
+    /// large points are drawn, so that surfaces close.
     pub(crate) shift: u32,
 }
 
@@ -332,6 +330,17 @@ impl Block {
         level
     }
 
+    /// How early each entry goes where there are too many: its level above the finest, and later
+    /// near robots; `None` for those that never go.
+    fn ranks(&self, owner: Owner, fineness: Fineness) -> impl Iterator<Item = Option<usize>> {
+        self.levels().into_iter().zip(&self.entries).map(move |(level, entry)| {
+            let shift = self.shift(owner, fineness, *entry);
+            let is_near = shift < fineness.far;
+            let rank = u32::from(level).saturating_sub(shift) + if is_near { 2 } else { 0 };
+            (owner == Owner::Still).then_some(rank as usize)
+        })
+    }
+
     fn leveled(&self, owner: Owner, fineness: Fineness) -> LeveledBlock {
         let level = self.levels();
         let mut order: Vec<usize> = (0..level.len()).collect();
@@ -344,7 +353,8 @@ impl Block {
         };
         let mut by_shift = [0_usize; 8];
         self.entries.iter().for_each(|e| by_shift[self.shift(owner, fineness, *e) as usize] += 1);
-        let shift = (0..8_u32).max_by_key(|&s| by_shift[s as usize]).unwrap_or(0);
+        let is_wide = |shift: &u32| by_shift[*shift as usize] * 10 >= level.len();
+        let shift = (0..8_u32).rev().find(is_wide).unwrap_or(0);
         LeveledBlock { counts, points: order.iter().map(point).collect(), shift }
     }
 }

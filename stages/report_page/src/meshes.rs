@@ -186,7 +186,7 @@ mod tests {
         assert!((1_000..=MOST_OF_ROBOT).contains(&entry.n_triangles), "{entry:?}");
         let size = entry.scale * STEPS;
         assert!((0.38..0.41).contains(&size), "{size}");
-        assert!(store.bytes.len() < 7 * entry.n_triangles, "{} bytes", store.bytes.len());
+        assert!(store.bytes.len() < 8 * entry.n_triangles, "{} bytes", store.bytes.len());
     }
 
     #[test]

@@ -27,7 +27,7 @@ class View {
     const sides = [[], [], []];
     const all = [[1e9, 1e9, 1e9], [-1e9, -1e9, -1e9]];
     for (const block of blocks.filter((b) => b.owner !== -2)) {
-      const n = block.counts.slice(0, 4).reduce((sum, c) => sum + c, 0);
+      const n = block.counts.slice(0, 5).reduce((sum, c) => sum + c, 0);
       for (let i = 4 * block.first; i < 4 * (block.first + n); i += 4) {
         for (let k = 0; k < 3; k++) {
           const v = block.corner[k] + (points[i + k] + 0.5) * block.edge / 1024;
@@ -66,7 +66,7 @@ class View {
     this.target = low.map((v, i) => (v + high[i]) / 2);
     this.target[2] = low[2] + 0.25 * (high[2] - low[2]);
     const aspect = Math.min(1, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight) * 0.8);
-    this.away = 0.8 * Math.hypot(high[0] - low[0], high[1] - low[1]) / aspect + 1;
+    this.away = 0.88 * Math.hypot(high[0] - low[0], high[1] - low[1]) / aspect + 1;
     [this.yaw, this.pitch] = [-0.9, 0.72];
     this.wake();
   }
@@ -142,7 +142,7 @@ class View {
     const focal = this.focal(h);
     drawing.begin("moving", w, h);
     const { rows, total } = drawing.within(drawing.visible(camera), focal, this.budget);
-    drawing.addPoints("moving", rows, camera, focal, isPoor ? 4 : 8);
+    drawing.addPoints("moving", rows, camera, focal, drawing.isSlow ? 4 : 8);
     drawing.finish("moving", camera, focal, isPoor);
     drawing.show("moving", 0.9);
     this.overlay(camera);
@@ -176,7 +176,7 @@ class View {
       now.push(rest.rows[rest.at]);
       n += rest.rows[rest.at].n;
     }
-    drawing.addPoints("resting", now, rest.camera, focal, 6 * ratio);
+    drawing.addPoints("resting", now, rest.camera, focal, 16 * ratio);
     const isLast = rest.at >= rest.rows.length;
     if (isLast) {
       drawing.finish("resting", rest.camera, focal, false);

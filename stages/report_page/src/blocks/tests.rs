@@ -47,7 +47,7 @@ fn no_more_points_stay_than_there_is_room_for() {
     let count = |most: usize| all(&points, most).iter().map(|(_, b)| b.points.len()).sum::<usize>();
     let [whole, part] = [20_000, 9_000].map(count);
     assert!(whole <= 20_500 && whole > 4_500, "{whole}");
-    assert!((8_500..9_500).contains(&part), "{part}");
+    assert!((7_500..9_500).contains(&part), "{part}");
 }
 
 #[test]
@@ -58,13 +58,13 @@ fn levels_are_thinnings_of_the_whole() {
     assert_eq!(blocks.len(), 1);
     let block = &blocks[0].1;
     assert_eq!(block.shift, 2);
-    // Voxels of 0.4 m, 0.2 m, …, each with one point of its level or of those before it.
+    // Voxels of 0.8 m, 0.4 m, …, each with one point of its level or of those before it.
     let mut n = 0;
     for (k, count) in block.counts.iter().enumerate() {
         n += count;
-        let side = 16 << k.min(4);
+        let side = 8 << k.min(5);
         assert_eq!(n, side * side, "level {k}");
-        let shift = COARSEST as usize - k.min(4);
+        let shift = COARSEST as usize - k.min(5);
         let voxels: std::collections::BTreeSet<u32> =
             block.points[..n as usize].iter().map(|(place, _)| place >> (3 * shift)).collect();
         assert_eq!(voxels.len(), n as usize);

@@ -115,7 +115,7 @@ fn points_come_back_where_they_were() {
     let mut places = Vec::new();
     for block in view["blocks"].as_array().expect("blocks") {
         let number = |i: usize| block[i].as_i64().expect("a number");
-        for count in 5..12 {
+        for count in 5..13 {
             let mut place = 0_u32;
             for _ in 0..number(count) {
                 let mut shift = 0;
