@@ -27,8 +27,8 @@ const SCRIPTS: [&str; 10] = [
 
 /// Name and version of the data of a page.
 pub const PAGE_SCHEMA: &str = "stillpoint.page/1";
-/// Most points of a page: a processor without graphics hardware draws them in a quarter of a second,
-/// and they take less than [`MOST_PACKED`] where they lie on surfaces.
+/// Most points of a page: a processor without graphics hardware draws them in a quarter of a
+/// second, and they take less than a page may have where they lie on surfaces.
 pub const MOST_POINTS: usize = 3_200_000;
 /// Most bytes of points and meshes as text; texts of the result come on top.
 const MOST_PACKED: usize = 12_000_000;
