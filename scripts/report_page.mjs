@@ -81,6 +81,8 @@ async function moves(page) {
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
   let before = await picture(page);
   const differs = async (what) => {
+    // A wheel's event comes after the call that turned it has returned.
+    await page.waitForTimeout(400);
     await rest(page);
     const now = await picture(page);
     check(now !== before, `${what} changes the picture`);
