@@ -164,11 +164,12 @@ fn encode(bodies: &[Coarse], out: &mut Vec<u8>) -> MeshEntry {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f32::consts::{PI, TAU};
 
     /// A ball of `n` by `n` patches.
     fn ball(n: u32) -> Mesh {
         let at = |i: u32, j: u32| {
-            let (a, b) = (i as f32 / n as f32 * 3.1416, j as f32 / n as f32 * 6.2832);
+            let (a, b) = (i as f32 / n as f32 * PI, j as f32 / n as f32 * TAU);
             [a.sin() * b.cos(), a.sin() * b.sin(), a.cos()].map(|v| 0.2 * v)
         };
         let places = (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j)));
