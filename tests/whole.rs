@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use stillpoint::engine::Engine;
 use stillpoint::estimate::estimate;
 use stillpoint::eval::compare::Agreement;
@@ -106,6 +107,7 @@ fn the_robot_is_found_and_any_number_of_threads_gives_the_same_bytes() {
         assert!(two[name] == *bytes, "{} differs", name.display());
     }
     scenes_are_the_same_and_load(dir.path(), &robots);
+    page_shows_the_result(&dir.path().join("out2"));
 }
 
 /// Each format of scenes is written with the same bytes for any number of threads, and the URDF
@@ -174,6 +176,46 @@ fn scenes_are_the_same_and_load(dir: &Path, robots: &Path) {
         assert!(words.contains("R1") && words.contains(what), "{words}");
         std::fs::remove_dir_all(&other).expect("is removed");
     }
+}
+
+/// A page is made of the result, twice with the same bytes; it holds the result as it is, and a
+/// changed mesh is refused.
+fn page_shows_the_result(out: &Path) {
+    let report = |flag: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
+        command.arg("report").arg(out).arg(flag).output().expect("starts")
+    };
+    let make = || {
+        assert!(report("--html").status.success());
+        std::fs::read_to_string(out.join("report.html")).expect("a page")
+    };
+    let page = make();
+    assert!(page == make(), "the same bytes");
+    assert!(page.len() < 15_000_000, "{} bytes", page.len());
+    let data = page.split_once("id=\"data\">").expect("data").1;
+    let data = data.split_once("</script>").expect("its end").0;
+    let result = std::fs::read_to_string(out.join("result.json")).expect("a result");
+    let value = |text: &str| -> serde_json::Value { serde_json::from_str(text).expect("JSON") };
+    let (data, result) = (value(data), value(&result));
+    assert_eq!(data["result"], result);
+    let points = data["n_points"].as_object().expect("counts").values();
+    let n: u64 = points.map(|n| n.as_u64().expect("a count")).sum();
+    let scans = result["labels"]["scans"].as_array().expect("scans").iter();
+    let all: u64 = scans.map(|scan| scan["n_points"].as_u64().expect("a count")).sum();
+    assert!(n <= all && n > all * 9 / 10, "{n} of {all} points");
+    let view = page.split_once("id=\"view-data\">").expect("the view").1;
+    let view = value(view.split_once("</script>").expect("its end").0);
+    assert!(view["trees"][0]["loops"].as_array().is_some_and(|loops| !loops.is_empty()), "loops");
+    assert!(view["robots"][0]["mesh"].is_u64(), "a body");
+    let printed = report("--json");
+    assert_eq!(value(&String::from_utf8_lossy(&printed.stdout))["result"], result);
+    let mesh = out.join("robots/R1/meshes/00_base_link.stl");
+    let mut bytes = std::fs::read(&mesh).expect("a mesh");
+    bytes[200] ^= 1;
+    std::fs::write(&mesh, bytes).expect("writes");
+    let refused = report("--html");
+    assert_eq!(refused.status.code(), Some(4));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("00_base_link.stl"));
 }
 
 /// Space about the robot: its body is its own, the air beside it was seen, the floor is fixed.

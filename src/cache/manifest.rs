@@ -20,9 +20,11 @@ use std::path::{Path, PathBuf};
 pub(super) const LIST: &str = "manifest.json";
 /// The main file of a result: the old one is removed first and the new one is moved last, so that
 /// its presence means that the files beside it belong to it.
-pub(super) const RESULT: &str = "result.json";
+pub(crate) const RESULT: &str = "result.json";
 /// Folder of files that are converted from a result afterwards; the manifest does not name them.
 pub(crate) const EXPORT: &str = "export";
+/// The page of a result, made on request; the manifest does not name it.
+pub(crate) const PAGE: &str = "report.html";
 /// Name and version of the format.
 const SCHEMA: &str = "stillpoint.manifest/2";
 /// Text before the digest of the manifest and after it.
@@ -195,6 +197,9 @@ impl Manifest {
         if digest_of(&old, RESULT) != digest_of(&manifest.files, RESULT) {
             told.extend(old_scenes(out));
         }
+        if old != manifest.files {
+            told.extend(forget(out, PAGE, "shows the earlier result; `stillpoint report --html`"));
+        }
         shift(&next.join(RESULT), &out.join(RESULT))?;
         shift(&next.join(LIST), &out.join(LIST))?;
         // Only empty folders are left; the next run removes them if this fails.
@@ -244,20 +249,10 @@ fn same_points(old: &[OutputFile], new: &[OutputFile]) -> bool {
 /// returns a message for each. A file that cannot be removed is named, too, and does not prevent
 /// the new result from being published.
 fn forget_exports(out: &Path) -> Vec<String> {
-    let mut told = Vec::new();
-    for name in export_names() {
-        let Ok(path) = without_links(out, &format!("{EXPORT}/{name}")) else { continue };
-        let went = match std::fs::remove_file(&path) {
-            Ok(()) => "was taken away",
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => continue,
-            Err(_) => "is to be taken away",
-        };
-        told.push(format!(
-            "{} {went}: it was converted from the points of the earlier result, which have changed; \
-                 `stillpoint export` makes it again",
-            path.display()
-        ));
-    }
+    let why = "was converted from the points of the earlier result, which have changed; \
+               `stillpoint export`";
+    let told = export_names().filter_map(|name| forget(out, &format!("{EXPORT}/{name}"), why));
+    let told = told.collect();
     let _ = std::fs::remove_dir(out.join(EXPORT));
     told
 }
@@ -278,6 +273,18 @@ fn old_scenes(out: &Path) -> Vec<String> {
         format!("{} shows the earlier result: `stillpoint export` makes it again", path.display())
     };
     paths.into_iter().map(message).collect()
+}
+
+/// Removes a file that was made from the earlier result, and returns a message where it was there;
+/// `why` ends with the command that makes it again.
+fn forget(out: &Path, name: &str, why: &str) -> Option<String> {
+    let path = without_links(out, name).ok()?;
+    let went = match std::fs::remove_file(&path) {
+        Ok(()) => "was taken away",
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
+        Err(_) => "is to be taken away",
+    };
+    Some(format!("{} {went}: it {why} makes it again", path.display()))
 }
 
 /// Compares all files of a result with its manifest; every file is read.

@@ -19,7 +19,7 @@ pub(crate) use digests::Digests;
 pub(crate) use key::Key;
 #[cfg(fuzzing)]
 pub(crate) use manifest::sealed;
-pub(crate) use manifest::{EXPORT, copc_name, tiles_of};
+pub(crate) use manifest::{EXPORT, PAGE, RESULT, copc_name, tiles_of};
 pub use manifest::{Manifest, OutputFile, Verification, check};
 pub use output::OutputDir;
 pub(crate) use pieces::{Cache, read, reused_in_words, written};

@@ -38,8 +38,8 @@ pub(super) enum Command {
     Rescan(RescanFlags),
     /// Verify that the files of a result are unchanged since they were written
     Verify(OutFlags),
-    /// Show the summary of a result again; --junit writes its robots as test cases for a build
-    /// server
+    /// Show the summary of a result again; --html writes a page with the plant in 3D, --junit its
+    /// robots as test cases for a build server
     Report(ReportFlags),
     /// Write the points of a result in another format, or its scene for planners and simulators
     Export(ExportFlags),
@@ -242,6 +242,13 @@ pub(super) struct ReportFlags {
     /// Write each robot as a test case to this JUnit file: trusted ones pass
     #[arg(long, value_name = "FILE")]
     pub(super) junit: Option<PathBuf>,
+    /// Write OUT/report.html: the plant in 3D with tables, one file that any browser shows offline;
+    /// a later run into OUT removes it if the result has changed, and reports it
+    #[arg(long)]
+    pub(super) html: bool,
+    /// Print the data of that page as JSON
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -68,7 +68,7 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
         Command::Plan(flags) => run::plan(flags, &line.common, say),
         Command::Rescan(flags) => run::rescan(flags, &line.common, say),
         Command::Verify(flags) => results::verify(flags, &line.common, say),
-        Command::Report(flags) => results::report(flags, say),
+        Command::Report(flags) => results::report(flags, &line.common, say),
         Command::Export(flags) => results::export(flags, &line.common, say),
         Command::Check(flags) => results::check_path(flags, &line.common, say),
         Command::Diff(flags) => results::diff(flags, say),

@@ -13,6 +13,7 @@ use crate::result::changed_things::ThingEntry;
 use crate::result::changes::{changes, words};
 use crate::result::conversion::convert;
 use crate::result::history;
+use crate::result::page::{page_data, write_page};
 use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
 use crate::{cache, check};
 use contract::words::count;
@@ -43,13 +44,23 @@ pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8>
     }
 }
 
-pub(super) fn report(flags: &ReportFlags, say: &Say) -> Result<u8> {
+pub(super) fn report(flags: &ReportFlags, common: &Common, say: &Say) -> Result<u8> {
     let files = VerifiedFiles::open(&flags.out)?;
     if let Some(path) = &flags.junit {
         export::write_junit(path, &files.result()?, files.manifest().partial)?;
     }
-    let Manifest { summary, warnings, partial, .. } = files.manifest().clone();
-    say.outcome(&Outcome { summary, warnings, partial, ..Outcome::default() });
+    let Manifest { mut summary, warnings, partial, .. } = files.manifest().clone();
+    if flags.html {
+        let means = common.means()?;
+        let page = write_page(&flags.out, &means, &common.engine(&means)?)?;
+        summary = format!("{}\npage in {}", summary.trim_end(), page.display());
+    }
+    if flags.json {
+        let means = common.means()?;
+        say.result(&page_data(&flags.out, &means, &common.engine(&means)?)?);
+    } else {
+        say.outcome(&Outcome { summary, warnings, partial, ..Outcome::default() });
+    }
     Ok(if partial { exit::PARTIAL } else { exit::OK })
 }
 

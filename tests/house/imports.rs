@@ -31,6 +31,7 @@ const FREE: [&str; 20] = [
     "ingest",
     "lattice",
     "register",
+    "report_page",
     "robot",
     "scene",
     "segment",

@@ -24,6 +24,7 @@
 
 pub mod atomic;
 pub mod block;
+mod bodies;
 mod calibration;
 mod canvas;
 mod change_picture;
@@ -60,6 +61,7 @@ mod table;
 mod tiles;
 
 pub use atomic::AtomicFile;
+pub use bodies::WrittenBodies;
 pub use calibration::{CalibrationEntry, FrameEntry};
 pub use canvas::{Canvas, Rgb, link_color, robot_color};
 pub use change_picture::{ChangedThing, draw_changes};

@@ -72,8 +72,8 @@ pub fn mesh_files(id: &str, model: &Model) -> Vec<Option<(String, u64)>> {
 }
 
 /// Length of the head of an STL file, bytes.
-const STL_HEAD: u64 = 84;
-const STL_TRIANGLE: u64 = 50;
+pub(crate) const STL_HEAD: u64 = 84;
+pub(crate) const STL_TRIANGLE: u64 = 50;
 
 /// A unique name for the files of each link, valid on every file system.
 fn file_names(model: &Model) -> Vec<String> {

@@ -1,0 +1,180 @@
+// Opens the page of a result in a headless Chromium with the network off and checks it: no error on
+// the console, no request, numbers as in result.json, and that turning, filtering and moving a joint
+// change the picture. Not part of CI, which has no browser.
+//
+//   npm install --prefix DIR playwright-core axe-core
+//   NODE_PATH=DIR/node_modules CHROMIUM=/usr/bin/chromium \
+//     node scripts/report_page.mjs OUT/report.html OUT/result.json [FOLDER FOR SCREENSHOTS]
+import { createRequire } from "node:module";
+import { readFileSync, mkdirSync, writeFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
+import { resolve, join } from "node:path";
+
+const require = createRequire(join(process.env.NODE_PATH || ".", "x.js"));
+const { chromium } = require("playwright-core");
+const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
+const [page_, result_, shots] = process.argv.slice(2);
+const result = JSON.parse(readFileSync(result_, "utf8"));
+// `DRAW=webgl` or `DRAW=software` chooses who draws; the page itself takes what is there.
+const address = pathToFileURL(resolve(page_)).href + (process.env.DRAW ? `#${process.env.DRAW}` : "");
+if (shots) mkdirSync(shots, { recursive: true });
+
+let failed = 0;
+function check(isRight, what, detail = "") {
+  if (!isRight) failed += 1;
+  console.log(`${isRight ? "ok    " : "FAILED"} ${what} ${detail}`);
+}
+
+const browser = await chromium.launch({ executablePath: process.env.CHROMIUM || "/usr/bin/chromium",
+  args: ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-gpu"] });
+
+async function open(width, height, colorScheme) {
+  const context = await browser.newContext({ viewport: { width, height }, colorScheme, offline: true,
+    hasTouch: width < 500 });
+  const page = await context.newPage();
+  const said = [];
+  const asked = [];
+  // What the driver says about its speed is no fault of the page.
+  page.on("console", (m) => m.text().includes("GPU stall") || said.push(`${m.type()}: ${m.text()}`));
+  page.on("pageerror", (e) => said.push(String(e)));
+  page.on("request", (r) => { if (r.url() !== address && !r.url().startsWith("data:")) asked.push(r.url()); });
+  const from = Date.now();
+  await page.goto(address);
+  await page.waitForFunction(() => document.documentElement.dataset.state);
+  const took = Date.now() - from;
+  await rest(page);
+  return { page, said, asked, took, whole: Date.now() - from, context };
+}
+
+/** Waits until everything is drawn. */
+async function rest(page) {
+  await page.evaluate(() => { delete document.documentElement.dataset.drawn; });
+  await page.locator("#canvas").dispatchEvent("wheel", { deltaY: 0 });
+  await page.waitForFunction(() => document.documentElement.dataset.drawn, null, { timeout: 120_000 });
+}
+
+const picture = async (page) => (await page.locator("#canvas").screenshot()).toString("base64");
+async function shot(page, name, whole = false) {
+  if (shots) writeFileSync(join(shots, `${name}.png`), await page.screenshot({ fullPage: whole }));
+}
+
+/** What is said, asked and drawn at one size. */
+async function look(width, height, scheme) {
+  const name = `${width}_${scheme}`;
+  const { page, said, asked, took, whole, context } = await open(width, height, scheme);
+  check((await page.evaluate(() => document.documentElement.dataset.state)) === "ready",
+    `${name}: the view is there`, `after ${took} ms, whole after ${whole} ms`);
+  await shot(page, `${name}_rest`);
+  await shot(page, `${name}_page`, true);
+  const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  check(wide <= 0, `${name}: nothing is wider than the screen`, String(wide));
+  await page.evaluate(axe);
+  const found = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
+  const serious = found.violations.filter((v) => ["serious", "critical"].includes(v.impact));
+  for (const v of found.violations) console.log(`       axe ${v.impact}: ${v.id}: ${v.nodes[0].html.slice(0, 120)}`);
+  check(serious.length === 0, `${name}: axe finds no serious fault`, `${found.violations.length} in all`);
+  return { page, said, asked, context };
+}
+
+async function moves(page) {
+  const box = await page.locator("#canvas").boundingBox();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  let before = await picture(page);
+  const differs = async (what) => {
+    // A wheel's event comes after the call that turned it has returned.
+    await page.waitForTimeout(400);
+    await rest(page);
+    const now = await picture(page);
+    check(now !== before, `${what} changes the picture`);
+    before = now;
+  };
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  // The text of each frame, while the mouse goes on.
+  await page.evaluate(() => {
+    globalThis.rates = [];
+    new MutationObserver(() => {
+      const rate = document.getElementById("status").textContent.match(/(\d+) frames/);
+      if (rate) globalThis.rates.push(Number(rate[1]));
+    }).observe(document.getElementById("status"), { childList: true });
+  });
+  const from = Date.now();
+  for (let i = 0; Date.now() - from < 6_000; i++) {
+    await page.mouse.move(x + 4 * (i % 90), y + (i % 9));
+    await page.waitForTimeout(10);
+  }
+  const rates = (await page.evaluate(() => globalThis.rates)).slice(8);
+  await shot(page, "moving");
+  await page.mouse.up();
+  rates.sort((a, b) => a - b);
+  const middle = rates[rates.length >> 1];
+  check(middle >= 15, "15 frames a second while it moves", `median ${middle}, least ${rates[0]}`);
+  await differs("dragging");
+  await page.mouse.wheel(0, -400);
+  await differs("the wheel");
+  await page.locator("#canvas").focus();
+  await page.keyboard.press("ArrowLeft");
+  await differs("an arrow key");
+  await page.locator("#classes label", { hasText: /^Fixed/ }).click();
+  await differs("a switch");
+  await page.locator("#classes label", { hasText: /^Fixed/ }).click();
+  await rest(page);
+  if (await page.locator("#joints input[type=range]").count()) {
+    await page.locator("#joints button", { hasText: "Show" }).click();
+    await rest(page);
+    await shot(page, "robot");
+    before = await picture(page);
+    const slider = page.locator("#joints input[type=range]").nth(1);
+    await slider.focus();
+    for (let i = 0; i < 12; i++) await page.keyboard.press("PageUp");
+    await differs("a joint");
+    await shot(page, "joint_moved");
+    await page.locator("#joints button", { hasText: "As found" }).click();
+    await differs("back to as found");
+  }
+  await page.locator("#cut summary").click();
+  await page.locator("#section input").nth(1).focus();
+  for (let i = 0; i < 4; i++) await page.keyboard.press("PageDown");
+  await differs("the section box");
+}
+
+/** Numbers of the page against those of the result. */
+async function numbers(page) {
+  for (const at of result.robots.keys()) {
+    await page.evaluate((id) => { document.getElementById(id).open = true; }, `robot-${at + 1}`);
+  }
+  await page.waitForTimeout(100);
+  let n = 0;
+  for (const [at, robot] of result.robots.entries()) {
+    const rows = await page.locator(`#robot-${at + 1} table`).first().locator("tbody tr").evaluateAll(
+      (all) => all.map((row) => [...row.cells].map((c) => c.textContent)));
+    for (const [name, value] of Object.entries(robot.joints)) {
+      const slides = (robot.slides || []).includes(name);
+      const factor = slides ? 1e3 : 180 / Math.PI;
+      const row = rows.find((r) => r[0] === name);
+      const near = (text, v) => Math.abs(parseFloat(text.replace("± ", "")) - v * factor) <= 0.0501;
+      const isRight = row && Math.abs(parseFloat(row[1]) - value * factor) <= 0.000501
+        && near(row[2], robot.sigma[name]) && row[3] === robot.certainty[name];
+      if (!isRight) check(false, `${robot.id} ${name}`, JSON.stringify(row));
+      n += 1;
+    }
+    const text = await page.locator(`#robot-${at + 1}`).textContent();
+    for (const reason of robot.reasons) check(text.includes(reason), `${robot.id}: ${reason}`);
+    check(text.includes(robot.verdict), `${robot.id} is ${robot.verdict}`);
+  }
+  console.log(`ok     ${n} joints as in the result`);
+}
+
+const first = await look(1280, 800, "light");
+await numbers(first.page);
+await moves(first.page);
+await first.page.emulateMedia({ media: "print" });
+if (shots) writeFileSync(join(shots, "print.pdf"), await first.page.pdf({ format: "A4" }));
+const others = [await look(1280, 800, "dark"), await look(390, 844, "light"), await look(390, 844, "dark")];
+for (const { said, asked } of [first, ...others]) {
+  check(said.length === 0, "the console is empty", said.slice(0, 3).join(" | "));
+  check(asked.length === 0, "nothing is requested", asked.slice(0, 3).join(" "));
+}
+await browser.close();
+console.log(failed ? `${failed} failed` : "all is well");
+process.exit(failed ? 1 : 0);

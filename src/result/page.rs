@@ -1,0 +1,210 @@
+//! Makes the page of a published result: reads its files, each compared with the list of files, and
+//! hands them to the stage that writes pages.
+
+use super::plant_state::PlantState;
+use crate::cache::{PAGE, RESULT, VerifiedFiles};
+use crate::detect::library;
+use crate::detect::robots::RobotList;
+use crate::engine::{Amount, Engine};
+use crate::io::own_paths::without_links;
+use crate::job::{Job, Means};
+use contract::{Error, Fit, Result, Verdict};
+use export::{BasePose, ResultFile, RobotEntry, WrittenBodies, read_tile};
+use geometry::Pose;
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use report_page::{PageLoop, PagePoint, PagePoints, PageRobot, PageScanner, PageTexts, ReportPage};
+use robot::Model;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// A published result of which a page is made.
+pub(crate) struct ReportedResult<'a> {
+    out: &'a Path,
+    files: &'a VerifiedFiles,
+    result: ResultFile,
+    state: PlantState,
+    means: &'a Means,
+    engine: &'a Engine,
+}
+
+impl<'a> ReportedResult<'a> {
+    /// Opens a result.
+    ///
+    /// # Errors
+    /// A file that is missing or was changed.
+    pub(crate) fn open(
+        out: &'a Path,
+        files: &'a VerifiedFiles,
+        means: &'a Means,
+        engine: &'a Engine,
+    ) -> Result<Self> {
+        let (result, state) = (files.result()?, PlantState::read(files)?);
+        Ok(Self { out, files, result, state, means, engine })
+    }
+
+    /// The data of the page as JSON, without points.
+    ///
+    /// # Errors
+    /// A file that is missing or was changed.
+    pub(crate) fn data(&self) -> Result<String> {
+        ReportPage::new(self.texts()?, self.scanners()).data(None)
+    }
+
+    /// Writes the page and returns its path.
+    ///
+    /// # Errors
+    /// A file that is missing or was changed, or the page cannot be written.
+    pub(crate) fn write(&self) -> Result<PathBuf> {
+        let mut page = ReportPage::new(self.texts()?, self.scanners());
+        let loops = self.loops();
+        for entry in &self.result.robots {
+            self.engine.cancel.check()?;
+            page.add_robot(self.robot(entry, &loops)?);
+        }
+        let mut points = page.points();
+        self.add_points(&mut points)?;
+        self.add_spaces(&mut points)?;
+        let html = page.html(&points)?;
+        let to = without_links(self.out, PAGE)?;
+        export::atomic::write(&to, html.as_bytes())?;
+        Ok(to)
+    }
+
+    fn texts(&self) -> Result<PageTexts> {
+        let text = |name: &str| -> Result<String> {
+            String::from_utf8(self.files.bytes(name)?)
+                .map_err(|e| Error::bad_input("file is not text").because(e).at(name))
+        };
+        let changes = self.result.rescan.as_ref().map(|rescan| text(&rescan.changes));
+        let whole = std::fs::canonicalize(self.out).unwrap_or_else(|_| self.out.to_path_buf());
+        let manifest = self.files.manifest();
+        Ok(PageTexts {
+            title: whole.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            program: env!("CARGO_PKG_VERSION").into(),
+            result: text(RESULT)?,
+            changes: changes.transpose()?,
+            summary: manifest.summary.clone(),
+            is_partial: manifest.partial,
+        })
+    }
+
+    /// The positions of scanners that are known.
+    fn scanners(&self) -> Vec<PageScanner> {
+        let known = self.state.scans.iter().filter(|scan| scan.has_beams());
+        let of = |scan: &contract::Scan| PageScanner {
+            name: scan.name.clone(),
+            at: scan.world_from_scan.translation.vector.into(),
+        };
+        known.map(of).collect()
+    }
+
+    /// The closed loops of each robot by its index, as far as the library of the run is still
+    /// there: a URDF cannot state them.
+    fn loops(&self) -> HashMap<usize, Vec<PageLoop>> {
+        let stands = |(_, fit): &(usize, Fit)| fit.verdict != Verdict::Refused;
+        let fits = self.state.fits.iter().cloned().enumerate().filter(stands);
+        let (numbers, fits): (Vec<usize>, Vec<Fit>) = fits.unzip();
+        let is_wanted = |name: &str| {
+            let is_it = |fit: &Fit| {
+                fit.model_name == name || fit.tool.as_ref().is_some_and(|tool| tool.model == name)
+            };
+            fits.iter().any(is_it)
+        };
+        let settings = robot::Settings { clouds: false, ..self.means.settings.robot };
+        let library =
+            library::load_those(&self.state.robots, is_wanted, &settings, None, self.engine);
+        let list = library.and_then(|library| library::robots_of(fits.clone(), &library));
+        let Ok(RobotList { fits, models }) = list else { return HashMap::new() };
+        let loops = fits.iter().map(|fit| PageLoop::of(&models[fit.model]));
+        numbers.into_iter().zip(loops).collect()
+    }
+
+    /// A robot as the result holds it; `None` for one without a model.
+    fn robot(
+        &self,
+        entry: &RobotEntry,
+        loops: &HashMap<usize, Vec<PageLoop>>,
+    ) -> Result<Option<PageRobot>> {
+        let folder = format!("robots/{}/", entry.id);
+        let urdf = format!("{folder}robot.urdf");
+        if !self.files.has(&urdf) || entry.link_poses.0.is_empty() {
+            return Ok(None);
+        }
+        let own = self.files.manifest().files.iter().map(|file| file.path.as_str());
+        let meshes = own.filter(|path| path.starts_with(&format!("{folder}meshes/")));
+        let meshes: Vec<PathBuf> =
+            meshes.map(|path| self.files.compared(path)).collect::<Result<_>>()?;
+        let settings = robot::Settings { clouds: false, ..self.means.settings.robot };
+        let (model, _) = Model::load_urdf(&self.files.compared(&urdf)?, &entry.model, &settings)?;
+        let WrittenBodies { links: bodies, hanging } = WrittenBodies::read(&meshes)?;
+        let poses: HashMap<&str, Pose> =
+            entry.link_poses.0.iter().map(|(name, at)| (&**name, pose(at))).collect();
+        let world_from_link = model.links.iter().map(|link| poses.get(&*link.name).copied());
+        let Some(world_from_link) = world_from_link.collect::<Option<Vec<Pose>>>() else {
+            return Ok(None);
+        };
+        let number = self.result.robots.iter().position(|own| own.id == entry.id);
+        let loops = number.and_then(|at| loops.get(&at)).cloned().unwrap_or_default();
+        Ok(Some(PageRobot { model, world_from_link, loops, bodies, hanging }))
+    }
+
+    /// Reads all tiles, one after the other.
+    fn add_points(&self, points: &mut PagePoints) -> Result<()> {
+        let names = self.files.manifest().files.iter().map(|file| file.path.as_str());
+        let tiles: Vec<&str> = names.filter(|path| path.starts_with("tiles/")).collect();
+        let las = self.state.records.las();
+        let stage = self.engine.progress.stage("page", Amount::items(tiles.len() as u64));
+        for tile in tiles {
+            self.engine.cancel.check()?;
+            let (path, stated) = self.files.stated(tile)?;
+            let mut piece: Vec<PagePoint> = Vec::new();
+            read_tile(&path, &las, stated, |old| {
+                piece.clear();
+                piece.extend(old.iter().map(|p| PagePoint { world: p.world, label: p.label }));
+                points.add(&piece);
+                stage.add(0, old.len() as u64, 0);
+                Ok(())
+            })?;
+            points.settle();
+            stage.add(1, 0, 0);
+        }
+        stage.finish();
+        Ok(())
+    }
+
+    fn add_spaces(&self, points: &mut PagePoints) -> Result<()> {
+        for space in self.result.robots.iter().filter_map(|robot| robot.space.as_ref()) {
+            self.engine.cancel.check()?;
+            self.files.compared(&space.grid)?;
+            points.add_space(&space.read(self.out)?);
+        }
+        Ok(())
+    }
+}
+
+/// Makes the page of the result in `out` and returns its path.
+///
+/// # Errors
+/// There is no result, a file of it was changed, another run uses the folder, or the page cannot
+/// be written.
+pub(crate) fn write_page(out: &Path, means: &Means, engine: &Engine) -> Result<PathBuf> {
+    let files = VerifiedFiles::open(out)?;
+    // No run can use a result that was copied without its store.
+    let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
+    ReportedResult::open(out, &files, means, engine)?.write()
+}
+
+/// The data of the page of the result in `out`, as JSON.
+///
+/// # Errors
+/// There is no result, or a file of it was changed.
+pub(crate) fn page_data(out: &Path, means: &Means, engine: &Engine) -> Result<String> {
+    let files = VerifiedFiles::open(out)?;
+    ReportedResult::open(out, &files, means, engine)?.data()
+}
+
+fn pose(at: &BasePose) -> Pose {
+    let [w, i, j, k] = at.quat_wxyz;
+    let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
+    Pose::from_parts(Translation3::from(at.xyz), turn)
+}
