@@ -1,15 +1,22 @@
 //! The step that reduces the residual voxels of all tiles to the labels of those that are attached
 //! to a robot.
 
+use crate::attached::{Attached, Decided, Group, attached_to, mark};
+use crate::body_cut::{Body, Contact, Preference};
+use crate::floating::{self, Bodies};
 use crate::settings::Settings;
+use crate::thin::{self, Shape};
 use crate::voxel_graph::Graph;
-use contract::{Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
-use robot::Model;
+use contract::{Fit, Fold, Label, LinkAt, ResidualVoxel, Result, Voxel};
+use robot::{JointKind, Model};
+use std::collections::BTreeMap;
 
 /// Decides which residual voxels are attached to which link.
 pub struct Attach {
     /// For each fit and each of its links: whether a free joint moves the link.
     moving: Vec<Vec<bool>>,
+    /// For each fit and each of its links: whether it may carry a tool or a part.
+    hands: Vec<Vec<bool>>,
     settings: Settings,
 }
 
@@ -22,42 +29,21 @@ pub struct ResidualSum {
     n_merged: usize,
 }
 
+/// Distance from a link up to which a voxel touches it and is not only near it, metres: the largest
+/// gate of the segmentation.
+const TOUCH: f32 = 0.012;
+/// Way along a body from where it touches a robot up to which nothing of it is called fixed because
+/// of a cut alone, hundredths of a voxel's edge (15 cm): there may be a tool.
+const DOUBT: u32 = 750;
+/// Way along a body up to which it is bolted to the robot whatever follows, hundredths of a voxel's
+/// edge (4 cm).
+const MOUNT: u32 = 200;
+/// Fewer fixed voxels than this, and less than one in so many of a component, are mixed pixels:
+/// they hang between the robot and what is behind it.
+const MIN_FIXED: usize = 3;
+const FEW: usize = 50;
 /// Number of voxels below which an early merge saves no memory worth its time.
 const MIN_MERGE: usize = 1 << 16;
-
-/// A component of residual voxels that touches a robot, for the report.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Group {
-    /// The moving link that most of its voxels touch.
-    pub link: LinkAt,
-    /// Number of voxels that are labelled as attached.
-    pub n_attached: usize,
-    /// Number of voxels that are labelled as uncertain.
-    pub n_uncertain: usize,
-    /// Number of residual points in the attached voxels.
-    pub n_points: u64,
-    /// Whether the component also reaches something fixed, so that it was cut.
-    pub is_cut: bool,
-}
-
-/// The labels of residual voxels.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Attached {
-    /// Voxels whose label is not fixed, sorted.
-    pub voxels: Vec<(Voxel, Label)>,
-    /// The components that touch a robot, sorted by their first voxel.
-    pub groups: Vec<Group>,
-}
-
-impl Attached {
-    /// The label of the residual points in a voxel: fixed where the voxel is not listed.
-    #[must_use]
-    pub fn label(&self, voxel: Voxel) -> Label {
-        self.voxels
-            .binary_search_by_key(&voxel, |entry| entry.0)
-            .map_or(Label::FIXED, |i| self.voxels[i].1)
-    }
-}
 
 impl Attach {
     /// Makes the step for the robots of a result, in the order of the result. `models` are those of
@@ -68,7 +54,11 @@ impl Attach {
             Some(model) if fit.gives_labels() => model.moving(),
             _ => Vec::new(),
         });
-        Self { moving: moving.collect(), settings }
+        let hands = fits.iter().map(|fit| match models.get(fit.model) {
+            Some(model) if fit.gives_labels() => hands(model),
+            _ => Vec::new(),
+        });
+        Self { moving: moving.collect(), hands: hands.collect(), settings }
     }
 
     fn is_moving(&self, at: LinkAt) -> bool {
@@ -76,94 +66,129 @@ impl Attach {
             == Some(&true)
     }
 
-    /// Labels one component. `members` are indices into `voxels`, which are the nodes of `graph`.
+    /// Labels one component that touches a robot. `members` are indices into `voxels`, which are
+    /// the nodes of `graph`.
     fn decide(
         &self,
         graph: &Graph,
         voxels: &[ResidualVoxel],
         members: &[usize],
-        paths: &mut ShortestPaths,
-        out: &mut Attached,
+        paths: &mut [(u32, u32)],
+        out: &mut Decided,
     ) {
-        let (mut robot, mut fixed, mut marks) = (Vec::new(), Vec::new(), Vec::new());
-        for &at in members {
-            let voxel = &voxels[at];
-            if voxel.distance <= self.settings.contact {
-                if self.is_moving(voxel.nearest) {
-                    let mark = u32::from(voxel.nearest.robot) << 16 | u32::from(voxel.nearest.link);
-                    robot.push((at, mark));
-                    marks.push(mark);
-                    continue;
-                }
-                fixed.push((at, 0));
-            } else if voxel.at_border || voxel.grounded {
-                fixed.push((at, 0));
-            }
+        let (mut robot, mut marks) = (Vec::new(), Vec::new());
+        let in_contact = |at: usize| {
+            voxels[at].distance <= self.settings.contact && self.is_moving(voxels[at].nearest)
+        };
+        for &at in members.iter().filter(|at| in_contact(**at)) {
+            let mark = mark(voxels[at].nearest);
+            robot.push((at, mark));
+            marks.push(mark);
         }
         let Some(link) = most_frequent(&mut marks) else { return };
-        let mut group =
-            Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut: !fixed.is_empty() };
-        graph.shortest_paths(&robot, &mut paths.robot);
-        graph.shortest_paths(&fixed, &mut paths.fixed);
-        let of_robot: Vec<usize> = members
-            .iter()
-            .copied()
-            .filter(|&at| self.belongs_to_robot(&voxels[at], at, &group, paths))
-            .collect();
-        let in_doubt = members.len() < self.settings.min_voxels
-            || (group.is_cut && self.is_wide(graph, &of_robot, paths));
-        for at in of_robot {
-            let mark = paths.robot[at].1;
-            let label = if in_doubt {
-                group.n_uncertain += 1;
-                Label::UNCERTAIN
-            } else {
-                group.n_attached += 1;
-                group.n_points += u64::from(voxels[at].n_residual);
-                Label {
-                    kind: PointKind::Attachment,
-                    robot: (mark >> 16) as i16,
-                    link: (mark & 0xffff) as i16,
-                }
+        graph.shortest_paths(&robot, paths);
+        let is_fixed = |at: usize| !in_contact(at) && self.is_fixed(&voxels[at]);
+        let n_fixed = members.iter().filter(|at| is_fixed(**at)).count();
+        let is_cut = n_fixed >= MIN_FIXED || (n_fixed > 0 && n_fixed * FEW >= members.len());
+        let mut group = Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut };
+        let sides = if is_cut {
+            let length = |at: usize| paths[at].0;
+            let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
+                _ if !in_contact(*at) => Contact::None,
+                true => Contact::Touch,
+                false => Contact::Near,
             };
-            out.voxels.push((voxels[at].voxel, label));
+            share(&Body {
+                graph,
+                members,
+                length: members.iter().map(|at| length(*at)).collect(),
+                from_hand: members.iter().map(|at| self.is_hand(paths[*at].1)).collect(),
+                contact: members.iter().map(contact).collect(),
+                is_fixed: members.iter().map(|at| is_fixed(*at)).collect(),
+                shape: thin::shapes(graph, members, length, self.settings.thin),
+            })
+        } else if members.len() < self.settings.min_voxels {
+            vec![Share::Open; members.len()]
+        } else {
+            vec![Share::Robot; members.len()]
+        };
+        for (&at, share) in members.iter().zip(sides) {
+            match share {
+                Share::Fixed if !in_contact(at) => {}
+                Share::Fixed | Share::Open => {
+                    group.n_uncertain += 1;
+                    out.labels[at] = Some(Label::UNCERTAIN);
+                }
+                Share::Robot => {
+                    group.n_attached += 1;
+                    group.n_points += u64::from(voxels[at].n_residual);
+                    out.labels[at] = Some(attached_to(paths[at].1));
+                }
+            }
         }
         out.groups.push(group);
     }
 
-    /// Whether a voxel belongs to the robot: the path along the component to the robot is shorter
-    /// than that to anything fixed.
-    fn belongs_to_robot(
-        &self,
-        voxel: &ResidualVoxel,
-        at: usize,
-        group: &Group,
-        paths: &ShortestPaths,
-    ) -> bool {
-        !group.is_cut
-            || (paths.robot[at].0 < paths.fixed[at].0 && voxel.distance <= self.settings.hold)
+    /// Whether the link of a mark may carry a tool or a part.
+    fn is_hand(&self, mark: u32) -> bool {
+        let hands = self.hands.get((mark >> 16) as usize);
+        hands.and_then(|hands| hands.get((mark & 0xffff) as usize)) == Some(&true)
     }
 
-    /// Whether the border between the robot's voxels and the rest of the component is too wide for
-    /// a hose.
-    fn is_wide(&self, graph: &Graph, of_robot: &[usize], paths: &mut ShortestPaths) -> bool {
-        for &at in of_robot {
-            paths.of_robot[at] = true;
-        }
-        let n = of_robot
-            .iter()
-            .filter(|at| graph.neighbours(**at).any(|(other, _)| !paths.of_robot[other]))
-            .count();
-        n as f64 * RESIDUAL_EDGE > self.settings.cut
+    /// Whether a voxel shows that its body is fixed: it stands on the floor, continues outside of
+    /// the region, or touches a link that no joint moves.
+    fn is_fixed(&self, voxel: &ResidualVoxel) -> bool {
+        let on_base = voxel.distance <= self.settings.contact && !self.is_moving(voxel.nearest);
+        on_base || voxel.at_border || voxel.grounded
     }
 }
 
-/// For each voxel the shortest path from the robot and from fixed objects, as length and mark, and
-/// whether the voxel belongs to the robot.
-struct ShortestPaths {
-    robot: Vec<(u32, u32)>,
-    fixed: Vec<(u32, u32)>,
-    of_robot: Vec<bool>,
+/// Shares out the voxels of a component that reaches both the robot and something fixed. What is on
+/// the robot's side of the cut near the robot is the robot's, up to two voxels beside the cut; what
+/// only the other cut gives to it is open, as is what is near the hand on the fixed side.
+fn share(body: &Body<'_>) -> Vec<Share> {
+    let near = body.robot_side(Preference::NearRobot);
+    let far = body.robot_side(Preference::NearFixed);
+    let place: BTreeMap<usize, usize> =
+        body.members.iter().enumerate().map(|(place, &at)| (at, place)).collect();
+    // A cut that leaves more than a tool on the robot's side has not found where the tool ends.
+    let is_hose = |k: usize| body.shape[k] == Shape::Hose;
+    let n = body.members.len();
+    let n_of = |side: &[bool]| side.iter().filter(|on| **on).count();
+    let is_lost = (0..n).any(|k| near[k] && !is_hose(k) && body.length[k] > 2 * DOUBT);
+    let is_clear = 10 * (0..n).filter(|k| near[*k] != far[*k]).count() <= n_of(&near);
+    let held = match (is_lost, is_clear) {
+        (true, _) => MOUNT,
+        (false, false) => DOUBT,
+        (false, true) => u32::MAX,
+    };
+    let inside = |side: &[bool]| -> Vec<bool> {
+        let is_in = |(k, at): (usize, &usize)| {
+            let mut beside = body.graph.neighbours(*at).filter_map(|(other, _)| place.get(&other));
+            side[k] && beside.all(|other| side[*other])
+        };
+        body.members.iter().enumerate().map(is_in).collect()
+    };
+    // One voxel beside a cut may be on either side of it, and two where it is no hose that is cut.
+    let once = inside(&near);
+    let twice = inside(&once);
+    let share = |k: usize| {
+        let is_held = twice[k] && body.length[k] <= held || once[k] && is_hose(k);
+        match (near[k], far[k]) {
+            (true, true) if is_held => Share::Robot,
+            (false, false) if body.length[k] > DOUBT || body.is_fixed[k] => Share::Fixed,
+            _ => Share::Open,
+        }
+    };
+    (0..n).map(share).collect()
+}
+
+/// To whom a voxel belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Share {
+    Robot,
+    Open,
+    Fixed,
 }
 
 impl Fold for Attach {
@@ -189,25 +214,30 @@ impl Fold for Attach {
 
     fn finish(&self, mut sum: ResidualSum) -> Result<Attached> {
         sum.merge();
+        let (residual, links): (Vec<ResidualVoxel>, Vec<ResidualVoxel>) =
+            sum.voxels.into_iter().partition(|v| v.n_residual > 0);
         // Voxels without residual points are filled by a link. They show the roughness of the link
         // and must not connect components.
-        let residual: Vec<ResidualVoxel> =
-            sum.voxels.into_iter().filter(|v| v.n_residual > 0).collect();
         let places: Vec<Voxel> = residual.iter().map(|v| v.voxel).collect();
         let graph = Graph::new(&places);
-        let unreached = (u32::MAX, u32::MAX);
-        let n = residual.len();
-        let mut paths = ShortestPaths {
-            robot: vec![unreached; n],
-            fixed: vec![unreached; n],
-            of_robot: vec![false; n],
-        };
-        let mut out = Attached::default();
-        for members in graph.components() {
-            self.decide(&graph, &residual, &members, &mut paths, &mut out);
+        let mut paths = vec![(u32::MAX, u32::MAX); residual.len()];
+        let components = graph.components();
+        let mut decided = Decided { labels: vec![None; residual.len()], groups: Vec::new() };
+        for members in &components {
+            self.decide(&graph, &residual, members, &mut paths, &mut decided);
         }
-        out.voxels.sort_unstable_by_key(|entry| entry.0);
-        Ok(out)
+        let bodies = Bodies {
+            gap: self.settings.gap,
+            voxels: &residual,
+            components: &components,
+            links: &links,
+            is_fixed: &|voxel| self.is_fixed(voxel),
+            is_hand: &|link| self.is_hand(mark(link)),
+        };
+        floating::attach(&bodies, &mut decided);
+        let labelled = residual.iter().zip(&decided.labels);
+        let voxels = labelled.filter_map(|(v, label)| Some((v.voxel, (*label)?))).collect();
+        Ok(Attached { voxels, groups: decided.groups })
     }
 }
 
@@ -225,6 +255,17 @@ impl ResidualSum {
         });
         self.n_merged = self.voxels.len();
     }
+}
+
+/// For each link, whether a joint moves it and no link that another joint moves comes after it.
+fn hands(model: &Model) -> Vec<bool> {
+    let moving = model.moving();
+    let mut carries = vec![false; moving.len()];
+    for joint in model.joints.iter().rev() {
+        let turns = joint.kind != JointKind::Fixed;
+        carries[joint.parent] |= carries[joint.child] || turns;
+    }
+    moving.iter().zip(carries).map(|(moving, carries)| *moving && !carries).collect()
 }
 
 /// The link of the mark that occurs most often, the smaller of equals; `None` without marks.
