@@ -13,7 +13,8 @@ use std::collections::BTreeMap;
 /// Cost of an edge between voxels that share a face, an edge or a corner.
 const EDGE_COST: [u64; 3] = [4, 2, 1];
 /// Cost of letting go of a voxel that is near the robot, and of one that touches it. A flat wall
-/// beside an arm is near it with an area, and the cut around that area costs more than letting go.
+/// beside an arm is near it with an area, and the cut around that area costs more than letting go. A
+/// hose that begins near an arm is clamped to it.
 const NEAR_COST: u64 = 1;
 const TOUCH_COST: u64 = 400;
 /// Way along the body from the robot up to which a cut costs more, hundredths of a voxel's edge
@@ -27,9 +28,10 @@ const FLAT_COST: u64 = 100;
 /// voxel's edge (10 cm), and the cost of taking one from the robot.
 const BOLTED: u32 = 500;
 const BOLTED_COST: u64 = 4;
-/// Way along the body over which the cost doubles where the cut near the robot is asked for,
-/// hundredths of a voxel's edge (40 cm).
-const DOUBLE: u32 = 2000;
+/// Way along the body over which the cost grows by its value at the robot where the cut near the
+/// robot is asked for, hundredths of a voxel's edge (10 cm), and up to which it grows (40 cm).
+const DOUBLE: u32 = 500;
+const GROWS: u32 = 2000;
 /// All costs are multiplied by this, so that the factors act on whole numbers.
 const SCALE: u64 = 16;
 /// How many times more an edge within a thin part costs.
@@ -59,6 +61,8 @@ pub(crate) struct Body<'a> {
     pub(crate) length: Vec<u32>,
     /// Whether that way begins at a hand, which may carry a tool.
     pub(crate) from_hand: Vec<bool>,
+    /// Way along the longest tool of the robot, hundredths of a voxel's edge.
+    pub(crate) longest_tool: u32,
     pub(crate) contact: Vec<Contact>,
     pub(crate) is_fixed: Vec<bool>,
     pub(crate) shape: Vec<Shape>,
@@ -75,8 +79,10 @@ impl Body<'_> {
         for (k, &at) in self.members.iter().enumerate() {
             match self.contact[k] {
                 Contact::None => {}
-                Contact::Near => network.add(source, k, SCALE * NEAR_COST),
-                Contact::Touch => network.add(source, k, SCALE * TOUCH_COST),
+                Contact::Near if self.shape[k] != Shape::Hose => {
+                    network.add(source, k, SCALE * NEAR_COST);
+                }
+                Contact::Near | Contact::Touch => network.add(source, k, SCALE * TOUCH_COST),
             }
             if self.shape[k] == Shape::Flat && preference == Preference::NearRobot {
                 network.add(k, sink, SCALE * FLAT_COST);
@@ -107,8 +113,10 @@ impl Body<'_> {
             let mounted = u64::from(MOUNT.saturating_sub(length)) * (MOUNT_FACTOR - 1) * SCALE;
             factor += mounted / u64::from(MOUNT);
         }
-        if preference == Preference::NearRobot {
-            factor += u64::from(length.min(DOUBLE)) * SCALE / u64::from(DOUBLE);
+        // A hose is as long as it is: nothing along it is nearer to the robot.
+        let is_hose = [a, b].iter().any(|k| self.shape[*k] == Shape::Hose);
+        if preference == Preference::NearRobot && !is_hose {
+            factor += u64::from(length.min(GROWS)) * SCALE / u64::from(DOUBLE);
         }
         // A hose is cut where another body holds it, and a leg nowhere.
         let enters_hose = |from: usize, to: usize| {

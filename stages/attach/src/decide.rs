@@ -2,14 +2,15 @@
 //! to a robot.
 
 use crate::attached::{Attached, Decided, Group, attached_to, mark};
-use crate::body_cut::{Body, Contact, Preference};
+use crate::body_cut::{Body, Contact};
+use crate::bridges::bridges;
 use crate::floating::{self, Bodies};
 use crate::settings::Settings;
-use crate::thin::{self, Shape};
+use crate::share::{Share, share};
+use crate::thin;
 use crate::voxel_graph::Graph;
-use contract::{Fit, Fold, Label, LinkAt, ResidualVoxel, Result, Voxel};
+use contract::{Fit, Fold, Label, LinkAt, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
 use robot::{JointKind, Model};
-use std::collections::BTreeMap;
 
 /// Decides which residual voxels are attached to which link.
 pub struct Attach {
@@ -17,6 +18,8 @@ pub struct Attach {
     moving: Vec<Vec<bool>>,
     /// For each fit and each of its links: whether it may carry a tool or a part.
     hands: Vec<Vec<bool>>,
+    /// For each fit the way along its longest tool, hundredths of a voxel's edge.
+    tools: Vec<u32>,
     settings: Settings,
 }
 
@@ -32,12 +35,10 @@ pub struct ResidualSum {
 /// Distance from a link up to which a voxel touches it and is not only near it, metres: the largest
 /// gate of the segmentation.
 const TOUCH: f32 = 0.012;
-/// Way along a body from where it touches a robot up to which nothing of it is called fixed because
-/// of a cut alone, hundredths of a voxel's edge (15 cm): there may be a tool.
-const DOUBT: u32 = 750;
-/// Way along a body up to which it is bolted to the robot whatever follows, hundredths of a voxel's
-/// edge (4 cm).
-const MOUNT: u32 = 200;
+/// Longest tool of a robot, as a share of the robot's reach, and at least so long, metres: a spot
+/// welding gun of 1 m on an arm that reaches 3.1 m.
+const LONGEST_TOOL: f64 = 0.33;
+const LEAST_TOOL: f64 = 0.3;
 /// Fewer fixed voxels than this, and less than one in so many of a component, are mixed pixels:
 /// they hang between the robot and what is behind it.
 const MIN_FIXED: usize = 3;
@@ -58,7 +59,11 @@ impl Attach {
             Some(model) if fit.gives_labels() => hands(model),
             _ => Vec::new(),
         });
-        Self { moving: moving.collect(), hands: hands.collect(), settings }
+        let tools = fits.iter().map(|fit| {
+            let reach = models.get(fit.model).map_or(0.0, Model::reach);
+            (100.0 * (LONGEST_TOOL * reach).max(LEAST_TOOL) / RESIDUAL_EDGE) as u32
+        });
+        Self { moving: moving.collect(), hands: hands.collect(), tools: tools.collect(), settings }
     }
 
     fn is_moving(&self, at: LinkAt) -> bool {
@@ -103,6 +108,7 @@ impl Attach {
                 members,
                 length: members.iter().map(|at| length(*at)).collect(),
                 from_hand: members.iter().map(|at| self.is_hand(paths[*at].1)).collect(),
+                longest_tool: self.tools.get(usize::from(link.robot)).copied().unwrap_or(0),
                 contact: members.iter().map(contact).collect(),
                 is_fixed: members.iter().map(|at| is_fixed(*at)).collect(),
                 shape: thin::shapes(graph, members, length, self.settings.thin),
@@ -143,54 +149,6 @@ impl Attach {
     }
 }
 
-/// Shares out the voxels of a component that reaches both the robot and something fixed. What is on
-/// the robot's side of the cut near the robot is the robot's, up to two voxels beside the cut; what
-/// only the other cut gives to it is open, as is what is near the hand on the fixed side.
-fn share(body: &Body<'_>) -> Vec<Share> {
-    let near = body.robot_side(Preference::NearRobot);
-    let far = body.robot_side(Preference::NearFixed);
-    let place: BTreeMap<usize, usize> =
-        body.members.iter().enumerate().map(|(place, &at)| (at, place)).collect();
-    // A cut that leaves more than a tool on the robot's side has not found where the tool ends.
-    let is_hose = |k: usize| body.shape[k] == Shape::Hose;
-    let n = body.members.len();
-    let n_of = |side: &[bool]| side.iter().filter(|on| **on).count();
-    let is_lost = (0..n).any(|k| near[k] && !is_hose(k) && body.length[k] > 2 * DOUBT);
-    let is_clear = 10 * (0..n).filter(|k| near[*k] != far[*k]).count() <= n_of(&near);
-    let held = match (is_lost, is_clear) {
-        (true, _) => MOUNT,
-        (false, false) => DOUBT,
-        (false, true) => u32::MAX,
-    };
-    let inside = |side: &[bool]| -> Vec<bool> {
-        let is_in = |(k, at): (usize, &usize)| {
-            let mut beside = body.graph.neighbours(*at).filter_map(|(other, _)| place.get(&other));
-            side[k] && beside.all(|other| side[*other])
-        };
-        body.members.iter().enumerate().map(is_in).collect()
-    };
-    // One voxel beside a cut may be on either side of it, and two where it is no hose that is cut.
-    let once = inside(&near);
-    let twice = inside(&once);
-    let share = |k: usize| {
-        let is_held = twice[k] && body.length[k] <= held || once[k] && is_hose(k);
-        match (near[k], far[k]) {
-            (true, true) if is_held => Share::Robot,
-            (false, false) if body.length[k] > DOUBT || body.is_fixed[k] => Share::Fixed,
-            _ => Share::Open,
-        }
-    };
-    (0..n).map(share).collect()
-}
-
-/// To whom a voxel belongs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Share {
-    Robot,
-    Open,
-    Fixed,
-}
-
 impl Fold for Attach {
     type In = Vec<ResidualVoxel>;
     type Sum = ResidualSum;
@@ -220,6 +178,8 @@ impl Fold for Attach {
         // and must not connect components.
         let places: Vec<Voxel> = residual.iter().map(|v| v.voxel).collect();
         let graph = Graph::new(&places);
+        let bridges = bridges(&graph, self.settings.thin);
+        let graph = graph.with_edges(&bridges);
         let mut paths = vec![(u32::MAX, u32::MAX); residual.len()];
         let components = graph.components();
         let mut decided = Decided { labels: vec![None; residual.len()], groups: Vec::new() };

@@ -13,11 +13,14 @@
 
 mod attached;
 mod body_cut;
+mod bridges;
 mod decide;
 mod floating;
 mod hulls;
 mod max_flow;
+mod near_voxels;
 mod settings;
+mod share;
 mod thin;
 mod voxel_graph;
 

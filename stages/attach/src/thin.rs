@@ -2,7 +2,7 @@
 //! cable, the neck of a torch.
 
 use crate::voxel_graph::Graph;
-use contract::RESIDUAL_EDGE;
+use contract::{RESIDUAL_EDGE, Voxel};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Distance around a voxel within which the shape of the body counts, voxels: 10 cm.
@@ -49,10 +49,11 @@ pub(crate) fn shapes(
     let place: BTreeMap<usize, usize> =
         members.iter().enumerate().map(|(place, &at)| (at, place)).collect();
     let around: Vec<([f64; 3], usize)> = members.iter().map(|at| spreads(graph, *at)).collect();
-    let is_thin: Vec<bool> = around.iter().map(|(spread, _)| is_line(spread, thin)).collect();
+    let is_thin: Vec<bool> =
+        around.iter().map(|(spread, _)| is_line(spread, thin, MIN_RATIO)).collect();
     let begins = |k: &usize| length(members[*k]) <= BEGINS;
     let is_reached = reached(graph, members, &place, (0..members.len()).filter(begins), &is_thin);
-    let shape = |(spread, n): &([f64; 3], usize)| match is_line(spread, thin) {
+    let shape = |(spread, n): &([f64; 3], usize)| match is_line(spread, thin, MIN_RATIO) {
         true => Shape::Leg,
         false if is_flat(spread, *n) => Shape::Flat,
         false => Shape::Body,
@@ -131,10 +132,17 @@ fn spreads(graph: &Graph, at: usize) -> ([f64; 3], usize) {
             }
         }
     }
+    let near: Vec<Voxel> = near.into_iter().map(|other| graph.voxel(other)).collect();
+    (spreads_of(&near, centre), near.len())
+}
+
+/// Standard deviations of voxels along their three main directions, voxels, ascending. `centre` is
+/// near them all.
+pub(crate) fn spreads_of(near: &[Voxel], centre: Voxel) -> [f64; 3] {
     let n = near.len() as f64;
     let (mut sum, mut squares) = ([0.0; 3], [[0.0; 3]; 3]);
-    for other in &near {
-        let by = by(*other).map(|v| v as f64);
+    for other in near {
+        let by = [0, 1, 2].map(|i| f64::from(other[i]) - f64::from(centre[i]));
         for i in 0..3 {
             sum[i] += by[i];
             (0..3).for_each(|j| squares[i][j] += by[i] * by[j]);
@@ -143,15 +151,16 @@ fn spreads(graph: &Graph, at: usize) -> ([f64; 3], usize) {
     let covariance = nalgebra::Matrix3::from_fn(|i, j| squares[i][j] / n - sum[i] * sum[j] / n / n);
     let mut spread = covariance.symmetric_eigenvalues().map(|v| v.max(0.0).sqrt());
     spread.as_mut_slice().sort_unstable_by(f64::total_cmp);
-    (spread.into(), near.len())
+    spread.into()
 }
 
-/// Whether the body around a voxel is thin: its voxels lie along a line.
-fn is_line(spread: &[f64; 3], thin: f64) -> bool {
+/// Whether voxels with these standard deviations lie along a line, no thicker than a circumference
+/// of `thin` metres and so many times longer.
+pub(crate) fn is_line(spread: &[f64; 3], thin: f64, ratio: f64) -> bool {
     // A ring has 1/√2 of its radius as standard deviation.
     let radius = thin / std::f64::consts::TAU / RESIDUAL_EDGE;
     let across = radius * std::f64::consts::FRAC_1_SQRT_2 + BLUR;
-    spread[1] <= across && spread[2] >= MIN_RATIO * spread[1].max(BLUR)
+    spread[1] <= across && spread[2] >= ratio * spread[1].max(BLUR)
 }
 
 /// Whether it is flat all around.

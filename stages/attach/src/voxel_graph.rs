@@ -39,6 +39,27 @@ impl Graph {
         graph
     }
 
+    /// The graph with more edges, each between two voxels, of a length in hundredths of a voxel's
+    /// edge.
+    pub(crate) fn with_edges(self, edges: &[(usize, usize, u32)]) -> Self {
+        let mut more: Vec<Vec<(usize, u32)>> = vec![Vec::new(); self.len()];
+        for &(a, b, step) in edges {
+            more[a].push((b, step));
+            more[b].push((a, step));
+        }
+        let mut graph =
+            Self { voxels: Vec::new(), starts: vec![0], to: Vec::new(), steps: Vec::new() };
+        for (at, more) in more.iter_mut().enumerate() {
+            more.extend(self.neighbours(at));
+            more.sort_unstable();
+            more.dedup_by_key(|edge| edge.0);
+            graph.to.extend(more.iter().map(|edge| edge.0 as u32));
+            graph.steps.extend(more.iter().map(|edge| edge.1));
+            graph.starts.push(graph.to.len());
+        }
+        Self { voxels: self.voxels, ..graph }
+    }
+
     /// The voxel with an index.
     pub(crate) fn voxel(&self, at: usize) -> Voxel {
         self.voxels[at]

@@ -10,9 +10,9 @@ use std::collections::{BTreeMap, HashSet, VecDeque};
 
 /// Half-width of the cube of voxels in which a curve is told from a surface, voxels: 15 cm.
 const AROUND: i32 = 3;
-/// Largest number of voxels of a curve in that cube: a hose on the edges of voxels fills two by two
-/// of seven layers. A flat surface fills 49 at least.
-const MAX_CURVE: usize = 30;
+/// Largest number of voxels of a curve in that cube: an oblique hose of 50 mm fills seven in each
+/// of seven layers.
+const MAX_CURVE: usize = 50;
 /// Largest standard deviation of a curve's voxels across its direction, voxels.
 const MAX_ACROSS: f64 = 0.9;
 /// Least standard deviation along it, voxels.

@@ -199,5 +199,27 @@ fn a_plate_in_the_air_belongs_to_the_hand_beside_it_unless_a_bench_is_as_near() 
         ..voxel(at, 1, 99)
     });
     let out = attached(&[vec![link], plate, bench]);
-    assert_eq!(out.label([5, 5, -10]), Label::FIXED);
+    assert_eq!(out.label([5, 5, -10]), Label::UNCERTAIN);
+}
+
+#[test]
+fn a_hose_that_is_seen_sparsely_moves_up_to_where_it_is_held() {
+    // Its ends are whole, and between them every other voxel is missing.
+    let hose: Vec<_> = (0..80)
+        .filter(|k| !(6..74).contains(k) || k % 2 == 0)
+        .map(|k| ResidualVoxel { at_border: k >= 78, ..voxel([k / 2, k / 2, k], 1, k) })
+        .collect();
+    let out = attached(std::slice::from_ref(&hose));
+    let n = hose.iter().filter(|v| out.label(v.voxel).kind == PointKind::Attachment).count();
+    assert!(n >= 40, "{n} of {}", hose.len());
+}
+
+#[test]
+fn mixed_pixels_beside_a_carried_plate_do_not_hold_it() {
+    let link = ResidualVoxel { n_residual: 0, n_link: 9, ..voxel([0, 0, 0], 1, 0) };
+    let plate: Vec<_> =
+        (0..12).flat_map(|x| (0..8).map(move |y| voxel([x, y, -10], 1, 99))).collect();
+    let mixed = vec![voxel([5, 5, -14], 1, 99), voxel([5, 6, -18], 1, 99)];
+    let out = attached(&[vec![link], plate, mixed]);
+    assert_eq!(out.label([5, 5, -10]), Label { kind: PointKind::Attachment, robot: 0, link: 1 });
 }

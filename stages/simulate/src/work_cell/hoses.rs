@@ -184,7 +184,7 @@ fn is_clear(
     };
     length > 0.25
         && !free.iter().any(|p| near_ground(p))
-        && !free.iter().any(|p| is_in_wall(p))
+        && !free.iter().any(is_in_wall)
         && worker
             .surface()
             .all(|(_, q)| !beside_column(&q) && free.iter().all(|p| (*p - q).norm() > CLEAR))

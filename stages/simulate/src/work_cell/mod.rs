@@ -62,12 +62,14 @@ impl Candidate<'_> {
     }
 }
 
+/// Number of scenes that are drawn until one leaves each robot room for a posture.
+const N_SCENES: u64 = 12;
+
 /// Draws a random scene of robots at work.
 ///
 /// # Errors
 /// `BadInput` if the library holds no robot that fits into such a scene.
 pub fn work_cell(wanted: &WorkCell, models: &[Model]) -> Result<Scene> {
-    let mut random = Random::keyed(&[wanted.seed, 0x3C9, wanted.work as u64]);
     let robots: Vec<Candidate<'_>> = models
         .iter()
         .filter(|m| !m.is_tool() && !m.flanges().is_empty())
@@ -77,6 +79,19 @@ pub fn work_cell(wanted: &WorkCell, models: &[Model]) -> Result<Scene> {
     if robots.is_empty() {
         return Err(Error::bad_input("the library holds no robot for a work cell"));
     }
+    let mut last = one_cell(wanted, &robots, 0);
+    for k in 1..N_SCENES {
+        if last.is_ok() {
+            break;
+        }
+        last = one_cell(wanted, &robots, k);
+    }
+    last
+}
+
+/// The scene of one attempt.
+fn one_cell(wanted: &WorkCell, robots: &[Candidate<'_>], attempt: u64) -> Result<Scene> {
+    let mut random = Random::keyed(&[wanted.seed, 0x3C9, wanted.work as u64, attempt]);
     let n = match wanted.work {
         Work::Touch | Work::Joined => 1,
         Work::Carry => 2 + random.below(2),
@@ -202,7 +217,7 @@ fn worker<'a>(
 ) -> Result<Worker<'a>> {
     let Candidate { model, reach } = *candidate;
     let name = format!("R{}", k + 1);
-    let stand = if reach < 1.2 { random.between(0.4, 0.85) } else { random.between(0.0, 0.3) };
+    let stand = if reach < 1.2 { random.between(0.4, 0.85) } else { random.between(0.05, 0.3) };
     let ground = scene.ground(x, 0.0);
     scene.stands.push(SceneStand {
         name: name.clone(),
