@@ -25,9 +25,9 @@ pub struct Agreement {
     pub n_invented: usize,
     /// Counts of points by true and assigned label.
     pub points: Confusion,
-    /// For each object of the scene, the number of its points and of those labelled as moving;
-    /// empty where the truth names no objects.
-    pub by_object: Vec<[u64; 2]>,
+    /// For each object of the scene, the number of its points, of those labelled as moving, and of
+    /// those labelled as uncertain; empty where the truth names no objects.
+    pub by_object: Vec<[u64; 3]>,
     /// Names of the objects.
     pub objects: Vec<String>,
 }
@@ -121,7 +121,7 @@ impl Agreement {
             robots,
             n_invented,
             points: Confusion::new(truth.robots.iter().map(|r| r.links.len())),
-            by_object: vec![[0; 2]; truth.objects.len()],
+            by_object: vec![[0; 3]; truth.objects.len()],
             objects: truth.objects.clone(),
         };
         for (i, scan) in result.labels.scans[first..].iter().enumerate() {
@@ -159,13 +159,15 @@ impl Agreement {
         Ok(())
     }
 
-    /// Points of each thing, and those that are said to move.
+    /// Points of each thing, those that are said to move, and those that are left open.
     fn count_objects(&mut self, ours: &Triple, objects: &[u8]) {
         for (i, object) in objects.as_chunks::<2>().0.iter().enumerate().take(ours.kind.len()) {
             let at = usize::from(u16::from_le_bytes(*object));
             if let Some(count) = self.by_object.get_mut(at) {
                 count[0] += 1;
-                count[1] += u64::from(ours.label(i).moves());
+                let said = ours.label(i);
+                count[1] += u64::from(said.moves());
+                count[2] += u64::from(said.kind == PointKind::Uncertain);
             }
         }
     }

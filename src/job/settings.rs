@@ -107,7 +107,7 @@ settings! {
         hand_reach,
     }
     attach: attach::Settings {
-        contact, hold, cut, min_voxels,
+        contact, thin, gap, min_voxels,
     }
     freespace: freespace::Settings {
         edge, enabled,
@@ -181,8 +181,8 @@ mod tests {
     fn names_of_earlier_versions_are_understood() {
         let mut settings = Settings::default();
         settings.set("merge.space", &toml::Value::Boolean(false)).expect("a former name");
-        settings.set("merge.cut", &toml::Value::Float(0.5)).expect("a former name");
-        assert!(!settings.freespace.enabled && settings.attach.cut == 0.5);
+        settings.set("merge.gap", &toml::Value::Float(0.5)).expect("a former name");
+        assert!(!settings.freespace.enabled && settings.attach.gap == 0.5);
     }
 
     #[test]

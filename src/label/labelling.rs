@@ -37,6 +37,7 @@ pub(crate) struct Labelling<'a> {
     models: &'a [Model],
     sources: &'a Sources,
     floor: &'a Floor,
+    clusters: &'a [Cluster],
     ground: FloorHeights,
     settings: segment::Settings,
     attach: attach::Settings,
@@ -170,7 +171,19 @@ impl<'a> Labelling<'a> {
         let export = settings.export;
         let bodies = export.bodies.then(|| ClusterLookup::new(clusters));
         let (settings, attach) = (settings.segment, settings.attach);
-        Self { fits, models, sources, floor, ground, settings, attach, bounds, export, bodies }
+        Self {
+            fits,
+            models,
+            sources,
+            floor,
+            clusters,
+            ground,
+            settings,
+            attach,
+            bounds,
+            export,
+            bodies,
+        }
     }
 
     /// The floor, for the label of a point that is near no robot.
@@ -182,7 +195,8 @@ impl<'a> Labelling<'a> {
     pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<NearRobots> {
         let robots = FittedRobots { fits: self.fits, models: self.models };
         let (scans, n_masks) = (self.sources.scans.as_slice(), self.sources.masks.len());
-        let scans = ScansNearRobots { store, floor: self.floor, scans, n_masks };
+        let scans =
+            ScansNearRobots { store, floor: self.floor, clusters: self.clusters, scans, n_masks };
         NearRobots::find(robots, &scans, self.settings, self.attach, engine)
     }
 

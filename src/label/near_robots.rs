@@ -5,7 +5,7 @@ use crate::detect::robots::FittedRobots;
 use crate::engine::{AllThreads, Amount, Engine, Task};
 use crate::store::Store;
 use attach::{Attach, AttachedPieces};
-use contract::{Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
+use contract::{Cluster, Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
 use segment::Segment;
 use std::ops::Range;
 
@@ -13,6 +13,8 @@ use std::ops::Range;
 pub(crate) struct ScansNearRobots<'a> {
     pub(crate) store: &'a Store,
     pub(crate) floor: &'a Floor,
+    /// Clusters of the whole plant, along which hoses are followed.
+    pub(crate) clusters: &'a [Cluster],
     pub(crate) scans: &'a [Scan],
     /// Number of masks of all inputs, including inputs without scans here.
     pub(crate) n_masks: usize,
@@ -37,9 +39,10 @@ impl NearRobots {
         engine: &Engine,
     ) -> Result<Self> {
         let FittedRobots { fits, models } = robots;
-        let &ScansNearRobots { store, floor, scans, n_masks } = scans;
+        let &ScansNearRobots { store, floor, clusters, scans, n_masks } = scans;
         let attach = Attach::new(fits, models, attach);
-        let segment = || Segment::new(fits, models, floor, scans, segment, &AllThreads);
+        let segment =
+            || Segment::new(fits, models, floor, scans, segment, &AllThreads).following(clusters);
         let segment = engine.pool()?.install(segment);
         let regions = segment.regions();
         let mut tiles: Vec<usize> = regions.iter().flat_map(|r| store.touching(r)).collect();

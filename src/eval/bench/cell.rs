@@ -168,7 +168,7 @@ impl ScannedCell {
         }
         let seconds = started.elapsed().as_secs_f64();
         let (floor, n_masks) = (&ground.surfaces.floor, scans.len());
-        let seen = ScansNearRobots { store: &store, floor, scans, n_masks };
+        let seen = ScansNearRobots { store: &store, floor, clusters: &clusters, scans, n_masks };
         let robots = FittedRobots { fits: &fits, models: &models };
         let near = NearRobots::find(robots, &seen, settings.segment, settings.attach, engine)?;
         let n_robot_points = self.n_robot_points;

@@ -10,6 +10,7 @@ mod condition;
 mod draw;
 pub mod frames;
 mod journal;
+mod kinds;
 mod labels;
 mod machine_limits;
 mod obstacles;

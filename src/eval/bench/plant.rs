@@ -5,6 +5,8 @@ use super::cases::{CaseRow, CaseToRun, Cases};
 use super::condition;
 use super::condition::{Condition, Mounting, PLAIN};
 use super::draw::draw;
+use super::kinds;
+use super::kinds::{KindScores, kind_table};
 use super::labels::MIN_LINK_POINTS;
 use super::request::{DrawnCases, check_suites, chosen};
 use crate::detect::library;
@@ -19,7 +21,7 @@ use robot::Model;
 use serde::Serialize;
 use simulate::random::Random;
 use simulate::scene::{RegistrationError, Scanner};
-use simulate::{Plant, Scene};
+use simulate::{Plant, Scene, Work, WorkCell, work_cell};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -46,6 +48,10 @@ const CELL: Plant = Plant {
     moves: false,
 };
 
+/// Angle between the beams of scans of robots at work, degrees: hoses of 24 mm are three beams wide
+/// 3 m away.
+const WORK_STEP_DEG: f64 = 0.15;
+
 /// Kind of the plant of a case.
 enum Drawing {
     /// A plant, all of whose robots are known.
@@ -56,6 +62,8 @@ enum Drawing {
     Shifted(Plant),
     /// One robot in clutter, bolted to such a thing.
     Hung(Mounting),
+    /// Robots at work.
+    Working(Work),
 }
 
 impl Drawing {
@@ -68,6 +76,10 @@ impl Drawing {
                 let mut scene = simulate::plant(&Plant { seed, ..plant.clone() }, models)?;
                 scene.scanners.iter_mut().enumerate().for_each(|(k, s)| shift(s, seed, k));
                 Ok(scene)
+            }
+            Self::Working(work) => {
+                let cell = WorkCell { seed, work: *work, n_scanners: 3, step_deg: WORK_STEP_DEG };
+                work_cell(&cell, models)
             }
             Self::Hung(mount) => {
                 let robots: Vec<usize> =
@@ -110,6 +122,10 @@ const SUITES: &[PlantSuite] = &[
         Drawing::Shifted(Plant { n_robots: [4, 1][k % 2], n_scanners: [6, 4][k % 2], ..CELL })
     }),
     ("mounts", 12, |k| Drawing::Hung([Mounting::Ceiling, Mounting::Wall, Mounting::Tilted][k % 3])),
+    ("touch", 20, |_| Drawing::Working(Work::Touch)),
+    ("carry", 20, |_| Drawing::Working(Work::Carry)),
+    ("hoses", 20, |_| Drawing::Working(Work::Hoses)),
+    ("joined", 20, |_| Drawing::Working(Work::Joined)),
 ];
 
 /// Least number of points of an object that is examined for wrong labels.
@@ -136,6 +152,8 @@ struct PlantRow {
     f1: f64,
     /// Intersection over union of each link.
     ious: Vec<f64>,
+    /// Points by what they truly lie on.
+    kinds: KindScores,
     /// Share of points of hoses, tools and parts that are said to move.
     attached: Option<f64>,
     /// Share of points that stand still said to move; and that of the thing that lost most, with
@@ -276,11 +294,13 @@ fn judge(row: &mut PlantRow, agreement: &Agreement) {
     let share = |[part, whole]: [u64; 2]| part as f64 / whole.max(1) as f64;
     row.attached = (agreement.points.attached[1] > 0).then(|| share(agreement.points.attached));
     row.lost = share([agreement.points.fixed[1], agreement.points.fixed[0]]);
-    let still = agreement.objects.iter().zip(&agreement.by_object).filter(|(name, count)| {
-        let moves = ["robot ", "tool of ", "carried ", "hose "];
-        count[0] >= MIN_OBJECT_POINTS && !moves.iter().any(|m| name.starts_with(m))
-    });
-    for (name, [all, lost]) in still {
+    row.kinds = KindScores::of(agreement);
+    let still = agreement
+        .objects
+        .iter()
+        .zip(&agreement.by_object)
+        .filter(|(name, count)| count[0] >= MIN_OBJECT_POINTS && !kinds::moves(name));
+    for (name, [all, lost, _]) in still {
         let lost = share([*lost, *all]);
         if lost > row.worst_lost {
             (row.worst_lost, row.worst_object) = (lost, name.clone());
@@ -334,6 +354,10 @@ fn table(rows: &[PlantRow]) -> String {
             let _ = writeln!(out, "| {name} | {} | {} |", counts(&own), figures(&own));
         }
     }
+    out.push_str(&kind_table(SUITES.iter().map(|(name, ..)| {
+        let own = rows.iter().filter(|r| r.suite == *name && r.failed.is_none());
+        (*name, own.map(|r| (&r.kinds, r.f1)).collect())
+    })));
     let odd = rows.iter().filter(|r| r.failed.is_some() || !r.notes.is_empty() || r.n_invented > 0);
     let odd: String = odd.map(|r| format!("\n- {}", r.line())).collect();
     if !odd.is_empty() {

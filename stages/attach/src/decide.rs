@@ -1,15 +1,25 @@
 //! The step that reduces the residual voxels of all tiles to the labels of those that are attached
 //! to a robot.
 
+use crate::attached::{Attached, Decided, Group, attached_to, mark};
+use crate::body_cut::{Body, Contact};
+use crate::bridges::bridges;
+use crate::floating::{self, Bodies};
 use crate::settings::Settings;
+use crate::share::{Share, share};
+use crate::thin;
 use crate::voxel_graph::Graph;
-use contract::{Fit, Fold, Label, LinkAt, PointKind, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
-use robot::Model;
+use contract::{Fit, Fold, Label, LinkAt, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
+use robot::{JointKind, Model};
 
 /// Decides which residual voxels are attached to which link.
 pub struct Attach {
     /// For each fit and each of its links: whether a free joint moves the link.
     moving: Vec<Vec<bool>>,
+    /// For each fit and each of its links: whether it may carry a tool or a part.
+    hands: Vec<Vec<bool>>,
+    /// For each fit the way along its longest tool, hundredths of a voxel's edge.
+    tools: Vec<u32>,
     settings: Settings,
 }
 
@@ -22,42 +32,19 @@ pub struct ResidualSum {
     n_merged: usize,
 }
 
+/// Distance from a link up to which a voxel touches it and is not only near it, metres: the largest
+/// gate of the segmentation.
+const TOUCH: f32 = 0.012;
+/// Longest tool of a robot, as a share of the robot's reach, and at least so long, metres: a spot
+/// welding gun of 1 m on an arm that reaches 3.1 m.
+const LONGEST_TOOL: f64 = 0.33;
+const LEAST_TOOL: f64 = 0.3;
+/// Fewer fixed voxels than this, and less than one in so many of a component, are mixed pixels:
+/// they hang between the robot and what is behind it.
+const MIN_FIXED: usize = 3;
+const FEW: usize = 50;
 /// Number of voxels below which an early merge saves no memory worth its time.
 const MIN_MERGE: usize = 1 << 16;
-
-/// A component of residual voxels that touches a robot, for the report.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Group {
-    /// The moving link that most of its voxels touch.
-    pub link: LinkAt,
-    /// Number of voxels that are labelled as attached.
-    pub n_attached: usize,
-    /// Number of voxels that are labelled as uncertain.
-    pub n_uncertain: usize,
-    /// Number of residual points in the attached voxels.
-    pub n_points: u64,
-    /// Whether the component also reaches something fixed, so that it was cut.
-    pub is_cut: bool,
-}
-
-/// The labels of residual voxels.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Attached {
-    /// Voxels whose label is not fixed, sorted.
-    pub voxels: Vec<(Voxel, Label)>,
-    /// The components that touch a robot, sorted by their first voxel.
-    pub groups: Vec<Group>,
-}
-
-impl Attached {
-    /// The label of the residual points in a voxel: fixed where the voxel is not listed.
-    #[must_use]
-    pub fn label(&self, voxel: Voxel) -> Label {
-        self.voxels
-            .binary_search_by_key(&voxel, |entry| entry.0)
-            .map_or(Label::FIXED, |i| self.voxels[i].1)
-    }
-}
 
 impl Attach {
     /// Makes the step for the robots of a result, in the order of the result. `models` are those of
@@ -68,7 +55,15 @@ impl Attach {
             Some(model) if fit.gives_labels() => model.moving(),
             _ => Vec::new(),
         });
-        Self { moving: moving.collect(), settings }
+        let hands = fits.iter().map(|fit| match models.get(fit.model) {
+            Some(model) if fit.gives_labels() => hands(model),
+            _ => Vec::new(),
+        });
+        let tools = fits.iter().map(|fit| {
+            let reach = models.get(fit.model).map_or(0.0, Model::reach);
+            (100.0 * (LONGEST_TOOL * reach).max(LEAST_TOOL) / RESIDUAL_EDGE) as u32
+        });
+        Self { moving: moving.collect(), hands: hands.collect(), tools: tools.collect(), settings }
     }
 
     fn is_moving(&self, at: LinkAt) -> bool {
@@ -76,94 +71,82 @@ impl Attach {
             == Some(&true)
     }
 
-    /// Labels one component. `members` are indices into `voxels`, which are the nodes of `graph`.
+    /// Labels one component that touches a robot. `members` are indices into `voxels`, which are
+    /// the nodes of `graph`.
     fn decide(
         &self,
         graph: &Graph,
         voxels: &[ResidualVoxel],
         members: &[usize],
-        paths: &mut ShortestPaths,
-        out: &mut Attached,
+        paths: &mut [(u32, u32)],
+        out: &mut Decided,
     ) {
-        let (mut robot, mut fixed, mut marks) = (Vec::new(), Vec::new(), Vec::new());
-        for &at in members {
-            let voxel = &voxels[at];
-            if voxel.distance <= self.settings.contact {
-                if self.is_moving(voxel.nearest) {
-                    let mark = u32::from(voxel.nearest.robot) << 16 | u32::from(voxel.nearest.link);
-                    robot.push((at, mark));
-                    marks.push(mark);
-                    continue;
-                }
-                fixed.push((at, 0));
-            } else if voxel.at_border || voxel.grounded {
-                fixed.push((at, 0));
-            }
+        let (mut robot, mut marks) = (Vec::new(), Vec::new());
+        let in_contact = |at: usize| {
+            voxels[at].distance <= self.settings.contact && self.is_moving(voxels[at].nearest)
+        };
+        for &at in members.iter().filter(|at| in_contact(**at)) {
+            let mark = mark(voxels[at].nearest);
+            robot.push((at, mark));
+            marks.push(mark);
         }
         let Some(link) = most_frequent(&mut marks) else { return };
-        let mut group =
-            Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut: !fixed.is_empty() };
-        graph.shortest_paths(&robot, &mut paths.robot);
-        graph.shortest_paths(&fixed, &mut paths.fixed);
-        let of_robot: Vec<usize> = members
-            .iter()
-            .copied()
-            .filter(|&at| self.belongs_to_robot(&voxels[at], at, &group, paths))
-            .collect();
-        let in_doubt = members.len() < self.settings.min_voxels
-            || (group.is_cut && self.is_wide(graph, &of_robot, paths));
-        for at in of_robot {
-            let mark = paths.robot[at].1;
-            let label = if in_doubt {
-                group.n_uncertain += 1;
-                Label::UNCERTAIN
-            } else {
-                group.n_attached += 1;
-                group.n_points += u64::from(voxels[at].n_residual);
-                Label {
-                    kind: PointKind::Attachment,
-                    robot: (mark >> 16) as i16,
-                    link: (mark & 0xffff) as i16,
-                }
+        graph.shortest_paths(&robot, paths);
+        let is_fixed = |at: usize| !in_contact(at) && self.is_fixed(&voxels[at]);
+        let n_fixed = members.iter().filter(|at| is_fixed(**at)).count();
+        let is_cut = n_fixed >= MIN_FIXED || (n_fixed > 0 && n_fixed * FEW >= members.len());
+        let mut group = Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut };
+        let sides = if is_cut {
+            let length = |at: usize| paths[at].0;
+            let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
+                _ if !in_contact(*at) => Contact::None,
+                true => Contact::Touch,
+                false => Contact::Near,
             };
-            out.voxels.push((voxels[at].voxel, label));
+            share(&Body {
+                graph,
+                members,
+                length: members.iter().map(|at| length(*at)).collect(),
+                from_hand: members.iter().map(|at| self.is_hand(paths[*at].1)).collect(),
+                longest_tool: self.tools.get(usize::from(link.robot)).copied().unwrap_or(0),
+                contact: members.iter().map(contact).collect(),
+                is_fixed: members.iter().map(|at| is_fixed(*at)).collect(),
+                shape: thin::shapes(graph, members, length, self.settings.thin),
+            })
+        } else if members.len() < self.settings.min_voxels {
+            vec![Share::Open; members.len()]
+        } else {
+            vec![Share::Robot; members.len()]
+        };
+        for (&at, share) in members.iter().zip(sides) {
+            match share {
+                Share::Fixed if !in_contact(at) => {}
+                Share::Fixed | Share::Open => {
+                    group.n_uncertain += 1;
+                    out.labels[at] = Some(Label::UNCERTAIN);
+                }
+                Share::Robot => {
+                    group.n_attached += 1;
+                    group.n_points += u64::from(voxels[at].n_residual);
+                    out.labels[at] = Some(attached_to(paths[at].1));
+                }
+            }
         }
         out.groups.push(group);
     }
 
-    /// Whether a voxel belongs to the robot: the path along the component to the robot is shorter
-    /// than that to anything fixed.
-    fn belongs_to_robot(
-        &self,
-        voxel: &ResidualVoxel,
-        at: usize,
-        group: &Group,
-        paths: &ShortestPaths,
-    ) -> bool {
-        !group.is_cut
-            || (paths.robot[at].0 < paths.fixed[at].0 && voxel.distance <= self.settings.hold)
+    /// Whether the link of a mark may carry a tool or a part.
+    fn is_hand(&self, mark: u32) -> bool {
+        let hands = self.hands.get((mark >> 16) as usize);
+        hands.and_then(|hands| hands.get((mark & 0xffff) as usize)) == Some(&true)
     }
 
-    /// Whether the border between the robot's voxels and the rest of the component is too wide for
-    /// a hose.
-    fn is_wide(&self, graph: &Graph, of_robot: &[usize], paths: &mut ShortestPaths) -> bool {
-        for &at in of_robot {
-            paths.of_robot[at] = true;
-        }
-        let n = of_robot
-            .iter()
-            .filter(|at| graph.neighbours(**at).any(|(other, _)| !paths.of_robot[other]))
-            .count();
-        n as f64 * RESIDUAL_EDGE > self.settings.cut
+    /// Whether a voxel shows that its body is fixed: it stands on the floor, continues outside of
+    /// the region, or touches a link that no joint moves.
+    fn is_fixed(&self, voxel: &ResidualVoxel) -> bool {
+        let on_base = voxel.distance <= self.settings.contact && !self.is_moving(voxel.nearest);
+        on_base || voxel.at_border || voxel.grounded
     }
-}
-
-/// For each voxel the shortest path from the robot and from fixed objects, as length and mark, and
-/// whether the voxel belongs to the robot.
-struct ShortestPaths {
-    robot: Vec<(u32, u32)>,
-    fixed: Vec<(u32, u32)>,
-    of_robot: Vec<bool>,
 }
 
 impl Fold for Attach {
@@ -189,25 +172,32 @@ impl Fold for Attach {
 
     fn finish(&self, mut sum: ResidualSum) -> Result<Attached> {
         sum.merge();
+        let (residual, links): (Vec<ResidualVoxel>, Vec<ResidualVoxel>) =
+            sum.voxels.into_iter().partition(|v| v.n_residual > 0);
         // Voxels without residual points are filled by a link. They show the roughness of the link
         // and must not connect components.
-        let residual: Vec<ResidualVoxel> =
-            sum.voxels.into_iter().filter(|v| v.n_residual > 0).collect();
         let places: Vec<Voxel> = residual.iter().map(|v| v.voxel).collect();
         let graph = Graph::new(&places);
-        let unreached = (u32::MAX, u32::MAX);
-        let n = residual.len();
-        let mut paths = ShortestPaths {
-            robot: vec![unreached; n],
-            fixed: vec![unreached; n],
-            of_robot: vec![false; n],
-        };
-        let mut out = Attached::default();
-        for members in graph.components() {
-            self.decide(&graph, &residual, &members, &mut paths, &mut out);
+        let bridges = bridges(&graph, self.settings.thin);
+        let graph = graph.with_edges(&bridges);
+        let mut paths = vec![(u32::MAX, u32::MAX); residual.len()];
+        let components = graph.components();
+        let mut decided = Decided { labels: vec![None; residual.len()], groups: Vec::new() };
+        for members in &components {
+            self.decide(&graph, &residual, members, &mut paths, &mut decided);
         }
-        out.voxels.sort_unstable_by_key(|entry| entry.0);
-        Ok(out)
+        let bodies = Bodies {
+            gap: self.settings.gap,
+            voxels: &residual,
+            components: &components,
+            links: &links,
+            is_fixed: &|voxel| self.is_fixed(voxel),
+            is_hand: &|link| self.is_hand(mark(link)),
+        };
+        floating::attach(&bodies, &mut decided);
+        let labelled = residual.iter().zip(&decided.labels);
+        let voxels = labelled.filter_map(|(v, label)| Some((v.voxel, (*label)?))).collect();
+        Ok(Attached { voxels, groups: decided.groups })
     }
 }
 
@@ -225,6 +215,17 @@ impl ResidualSum {
         });
         self.n_merged = self.voxels.len();
     }
+}
+
+/// For each link, whether a joint moves it and no link that another joint moves comes after it.
+fn hands(model: &Model) -> Vec<bool> {
+    let moving = model.moving();
+    let mut carries = vec![false; moving.len()];
+    for joint in model.joints.iter().rev() {
+        let turns = joint.kind != JointKind::Fixed;
+        carries[joint.parent] |= carries[joint.child] || turns;
+    }
+    moving.iter().zip(carries).map(|(moving, carries)| *moving && !carries).collect()
 }
 
 /// The link of the mark that occurs most often, the smaller of equals; `None` without marks.

@@ -1,7 +1,7 @@
 //! Makes convex pieces of the voxels that are attached to each link of a robot, in the frame of the
 //! link. A motion planner adds them to the robot's own model. The number of triangles is bounded.
 
-use crate::decide::Attached;
+use crate::attached::Attached;
 use contract::{Fit, PointKind, RESIDUAL_EDGE, Voxel};
 use geometry::{Point, Pose};
 use robot::{Mesh, Model};

@@ -5,15 +5,26 @@
 //! are connected to components over all tiles.
 //!
 //! A component that touches a moving link and nothing fixed is an attachment. A component that
-//! touches both is cut where the paths along it to the link and to the fixed object are equally
-//! long. What does not clearly belong to the robot is labelled as fixed or uncertain.
+//! touches both is cut where that costs least, twice: once where a cut near the robot is preferred,
+//! and once without. What both cuts leave to the robot moves, if it is a hose or near the hand.
+//! What they disagree on is uncertain, and the rest is fixed. A body in the air beside a hand, far
+//! from everything else, belongs to the hand.
 #![forbid(unsafe_code)]
 
+mod attached;
+mod body_cut;
+mod bridges;
 mod decide;
+mod floating;
 mod hulls;
+mod max_flow;
+mod near_voxels;
 mod settings;
+mod share;
+mod thin;
 mod voxel_graph;
 
-pub use decide::{Attach, Attached, Group};
+pub use attached::{Attached, Group};
+pub use decide::Attach;
 pub use hulls::{AttachedPieces, attached_pieces};
 pub use settings::Settings;

@@ -6,19 +6,18 @@ pub struct Settings {
     /// Contact: a voxel touches a link if one of its points is at most this far from the link,
     /// metres. It is the edge of a voxel plus the gate of the segmentation.
     pub contact: f32,
-    /// Largest distance from a link at which a voxel counts as attached, metres. It applies to
-    /// components that also reach something fixed.
-    pub hold: f32,
-    /// Widest cut through a component between robot and fixed object, metres of voxel edges along
-    /// the cut. A hose or a cable has a smaller cut. A larger one indicates a wall or a jig that
-    /// the robot touches, and the voxels become uncertain.
-    pub cut: f64,
+    /// Largest circumference of a thin part of a body, metres: a hose of 60 mm. Such a part moves
+    /// or stands still as a whole between the bodies at its ends.
+    pub thin: f64,
+    /// Largest distance between a hand, or what it carries, and a body that hangs in the air
+    /// beside it, metres: the length of a tool that no scan saw.
+    pub gap: f64,
     /// Components with fewer voxels are too small to judge; their voxels become uncertain.
     pub min_voxels: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { contact: 0.025, hold: 0.15, cut: 0.3, min_voxels: 3 }
+        Self { contact: 0.025, thin: 0.19, gap: 0.35, min_voxels: 3 }
     }
 }

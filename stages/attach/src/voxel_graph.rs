@@ -7,6 +7,7 @@ use std::collections::{BinaryHeap, HashMap};
 
 /// The neighbours of each voxel of a sorted list.
 pub(crate) struct Graph {
+    voxels: Vec<Voxel>,
     /// Neighbours of voxel `i` are `to[starts[i]..starts[i + 1]]`, ascending.
     starts: Vec<usize>,
     to: Vec<u32>,
@@ -21,7 +22,8 @@ impl Graph {
         // The map is only looked up and never iterated, so that its order cannot affect the result.
         let index: HashMap<Voxel, u32> =
             voxels.iter().enumerate().map(|(i, v)| (*v, i as u32)).collect();
-        let mut graph = Self { starts: vec![0], to: Vec::new(), steps: Vec::new() };
+        let mut graph =
+            Self { voxels: voxels.to_vec(), starts: vec![0], to: Vec::new(), steps: Vec::new() };
         for v in voxels {
             for n in (0..27).filter(|n| *n != 13) {
                 let by = [n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1];
@@ -35,6 +37,32 @@ impl Graph {
             graph.starts.push(graph.to.len());
         }
         graph
+    }
+
+    /// The graph with more edges, each between two voxels, of a length in hundredths of a voxel's
+    /// edge.
+    pub(crate) fn with_edges(self, edges: &[(usize, usize, u32)]) -> Self {
+        let mut more: Vec<Vec<(usize, u32)>> = vec![Vec::new(); self.len()];
+        for &(a, b, step) in edges {
+            more[a].push((b, step));
+            more[b].push((a, step));
+        }
+        let mut graph =
+            Self { voxels: Vec::new(), starts: vec![0], to: Vec::new(), steps: Vec::new() };
+        for (at, more) in more.iter_mut().enumerate() {
+            more.extend(self.neighbours(at));
+            more.sort_unstable();
+            more.dedup_by_key(|edge| edge.0);
+            graph.to.extend(more.iter().map(|edge| edge.0 as u32));
+            graph.steps.extend(more.iter().map(|edge| edge.1));
+            graph.starts.push(graph.to.len());
+        }
+        Self { voxels: self.voxels, ..graph }
+    }
+
+    /// The voxel with an index.
+    pub(crate) fn voxel(&self, at: usize) -> Voxel {
+        self.voxels[at]
     }
 
     /// Number of voxels.

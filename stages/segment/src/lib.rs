@@ -29,6 +29,7 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod curves;
 mod field;
 mod ground;
 mod raster;

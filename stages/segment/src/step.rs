@@ -1,12 +1,13 @@
 //! The segmentation step: labels of one tile's points near robots, and its residual voxels.
 
 use crate::body::{StandingRobot, bodies, box_distance};
+use crate::curves::Curves;
 use crate::field::FIELD_REACH;
 use crate::ground::FloorHeights;
 use crate::raster::PixelRaster;
 use crate::settings::Settings;
 use contract::{
-    Error, Fan, Fit, Floor, Kind, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE,
+    Cluster, Error, Fan, Fit, Floor, Kind, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE,
     ResidualVoxel, Result, Scan, Tile, TileLabels,
 };
 use geometry::depth::{Rows, rotate, rows, transform};
@@ -34,6 +35,8 @@ pub struct Segment {
     effectors: Vec<Vec<bool>>,
     ground: FloorHeights,
     scans: Vec<Scan>,
+    /// Hoses outside of the surroundings of the robots.
+    curves: Curves,
     settings: Settings,
 }
 
@@ -111,14 +114,25 @@ impl Segment {
             effectors: fits.iter().map(|fit| effectors(models.get(fit.model))).collect(),
             ground: FloorHeights::new(floor, &settings),
             scans: scans.to_vec(),
+            curves: Curves::default(),
             settings,
         }
     }
 
-    /// World bounds of each robot's region, metres. Only tiles that touch one need to be segmented.
+    /// Follows hoses out of the surroundings of the robots, up to the body where they end.
+    /// `clusters` are those of the whole plant.
+    #[must_use]
+    pub fn following(mut self, clusters: &[Cluster]) -> Self {
+        self.curves = Curves::follow(&self.bodies, clusters);
+        self
+    }
+
+    /// World bounds in which points are examined, metres: each robot's region, and those of hoses.
+    /// Only tiles that touch one need to be segmented.
     #[must_use]
     pub fn regions(&self) -> Vec<Aabb> {
-        self.bodies.iter().map(|body| body.region).collect()
+        let curves = self.curves.bounds().iter().copied();
+        self.bodies.iter().map(|body| body.region).chain(curves).collect()
     }
 
     /// Labels the links of tools as attachments: they belong to an effector, not to the robot.
@@ -204,6 +218,24 @@ impl Segment {
         }
     }
 
+    /// Lets the point of a hose that leaves the surroundings of a robot be examined outside of
+    /// them.
+    fn follow_curve(&self, world: [f64; 3], found: &mut PointState) {
+        match (self.curves.at(world), &mut *found) {
+            (Some((link, ends)), PointState::Default) if !self.ground.is_floor(world) => {
+                let height = self.ground.height_above(world);
+                *found = PointState::Residual(NearestLink {
+                    link,
+                    distance: f32::INFINITY,
+                    at_border: ends,
+                    grounded: height.is_some_and(|h| h < GROUNDED),
+                });
+            }
+            (Some((_, false)), PointState::Residual(near)) => near.at_border = false,
+            _ => {}
+        }
+    }
+
     /// Whether a point close to the floor lies on the upright side of a link, well inside its gate.
     fn on_side(&self, s: &LinkInTile, surface: [f32; 3], distance: f32) -> bool {
         let up = s.link.world_from_link.rotation.inverse() * geometry::Vector::z();
@@ -268,7 +300,8 @@ impl Map for Segment {
             voxels: Vec::new(),
         };
         let seen = self.seen(&tile, &scan.world_from_scan);
-        if seen.is_empty() {
+        let has_curves = self.curves.bounds().iter().any(|bounds| bounds.touches(&tile.bounds));
+        if seen.is_empty() && !has_curves {
             return Ok(empty);
         }
         let raster = scan.lattice.as_ref().map(|lattice| {
@@ -280,18 +313,21 @@ impl Map for Segment {
         scratch.found.clear();
         for (block, points) in tile.xyz.chunks(BLOCK).enumerate() {
             let near = near(&seen, points);
-            if near.is_empty() {
+            if near.is_empty() && !has_curves {
                 scratch.found.resize(scratch.found.len() + points.len(), PointState::Default);
                 continue;
             }
             for (i, p) in points.iter().enumerate() {
                 let at = block * BLOCK + i;
                 let world = world(&scan.world_from_scan, *p);
-                let found = if regions.iter().any(|region| region.contains(world)) {
+                let mut found = if regions.iter().any(|region| region.contains(world)) {
                     self.judge(&near, *p, world, || raster.and_then(|r| r.normal(&tile, at)))
                 } else {
                     PointState::Default
                 };
+                if has_curves {
+                    self.follow_curve(world, &mut found);
+                }
                 scratch.found.push(found);
             }
         }

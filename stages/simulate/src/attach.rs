@@ -10,8 +10,9 @@ const ARC_PIECES: usize = 24;
 const HOSE_SIDES: usize = 14;
 
 /// A hose through points of the world (metres): parabolas between them that hang down by `sag` of
-/// each distance.
-pub(crate) fn hose(hose: &Hose, held: &[Point]) -> Solid {
+/// each distance. Returns its runs from anchor to anchor: whether the run moves, and its body. A
+/// run moves with a link that holds one of its ends; `moves` tells that of each anchor.
+pub(crate) fn hose(hose: &Hose, held: &[Point], moves: &[bool]) -> Vec<(bool, Solid)> {
     let mut path = vec![held[0]];
     for pair in held.windows(2) {
         let (a, b) = (pair[0], pair[1]);
@@ -29,14 +30,23 @@ pub(crate) fn hose(hose: &Hose, held: &[Point]) -> Solid {
             );
         }
     }
-    let mut out = tube(&path, hose.radius, HOSE_SIDES);
-    for end in [[path[0], path[1]], [path[path.len() - 1], path[path.len() - 2]]] {
+    let run_moves: Vec<bool> = moves.windows(2).map(|pair| pair[0] || pair[1]).collect();
+    let mut out: Vec<(bool, Solid)> = Vec::new();
+    let mut first = 0;
+    for run in run_moves.chunk_by(|a, b| a == b) {
+        let pieces = &path[first * ARC_PIECES..=(first + run.len()) * ARC_PIECES];
+        out.push((run[0], tube(pieces, hose.radius, HOSE_SIDES)));
+        first += run.len();
+    }
+    let last = out.len().saturating_sub(1);
+    for (run, end) in
+        [(0, [path[0], path[1]]), (last, [path[path.len() - 1], path[path.len() - 2]])]
+    {
         let along = (end[1] - end[0]).try_normalize(1e-9).unwrap_or_else(Vector::z);
-        out.add(&tube(
-            &[end[0] - along * 0.01, end[0] + along * 0.04],
-            1.4 * hose.radius,
-            HOSE_SIDES,
-        ));
+        let sleeve = [end[0] - along * 0.01, end[0] + along * 0.04];
+        if let Some((_, body)) = out.get_mut(run) {
+            body.add(&tube(&sleeve, 1.4 * hose.radius, HOSE_SIDES));
+        }
     }
     out
 }

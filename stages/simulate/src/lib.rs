@@ -52,6 +52,7 @@ mod simulator;
 pub mod solid;
 mod spot;
 mod truth;
+mod work_cell;
 mod world;
 
 pub use columns::{ScanFrame, SimColumns, SimScan};
@@ -66,3 +67,4 @@ pub use sessions::sessions;
 pub use shapes::{BodyShape, Shapes};
 pub use simulator::Simulator;
 pub use truth::{LaterPosture, SCHEMA, TruePose, TrueRobot, TrueScan, Truth};
+pub use work_cell::{Work, WorkCell, work_cell};

@@ -127,7 +127,7 @@ fn rooms<'a>(
 }
 
 /// Largest horizontal distance of a robot's parts from its base over a few postures, metres.
-fn reach(model: &Model) -> f64 {
+pub(crate) fn reach(model: &Model) -> f64 {
     let mut random = Random::keyed(&[7]);
     let mut all: Vec<f64> = (0..24)
         .map(|_| {
@@ -345,7 +345,7 @@ fn stand(
 }
 
 /// Largest horizontal distance of a corner of the first link with a body from the base, metres.
-fn foot_radius(model: &Model) -> f64 {
+pub(crate) fn foot_radius(model: &Model) -> f64 {
     let poses = model.poses(&model.home());
     let standing = model.links.iter().zip(&poses).find(|(l, _)| !l.mesh.vertices.is_empty());
     standing.map_or(0.3, |(link, pose)| {
@@ -355,7 +355,7 @@ fn foot_radius(model: &Model) -> f64 {
 }
 
 /// Height of the lowest corner of the first link with a body, metres.
-fn lowest(model: &Model) -> f64 {
+pub(crate) fn lowest(model: &Model) -> f64 {
     let poses = model.poses(&model.home());
     let standing = model.links.iter().zip(&poses).find(|(l, _)| !l.mesh.vertices.is_empty());
     standing.map_or(0.0, |(link, pose)| {

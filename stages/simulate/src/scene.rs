@@ -247,7 +247,8 @@ pub struct Anchor {
 }
 
 /// A hose that hangs from anchor to anchor. It is attached to the first robot that holds it by a
-/// link other than the root; if there is none, it counts as fixed.
+/// link that moves; if there is none, it is fixed. A run between two anchors that do not move is
+/// fixed as well.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hose {

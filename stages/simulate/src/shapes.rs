@@ -114,7 +114,7 @@ mod tests {
         assert!(shapes.ends(&at(0.0, 0.0), &at(1.0, 0.0), 10.0));
         assert!(!shapes.ends(&at(0.0, 1.0), &at(1.0, 1.0), 10.0));
         let names: Vec<&str> = shapes.all.iter().map(|s| &*s.name).collect();
-        assert_eq!(names, ["box crate", "hose wire"]);
+        assert_eq!(names, ["box crate", "line wire"]);
         assert!(shapes.all.iter().all(|s| s.robot.is_none() && s.link.is_none()));
     }
 }

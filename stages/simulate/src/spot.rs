@@ -104,7 +104,7 @@ impl RobotSpot<'_> {
 
 /// Boxes that arms must not enter: furniture and stands, a robot's own stand up to just below its
 /// top.
-fn keep_out(scene: &Scene, own: &str) -> Vec<([f64; 3], [f64; 3])> {
+pub(crate) fn keep_out(scene: &Scene, own: &str) -> Vec<([f64; 3], [f64; 3])> {
     let around = |xy: [f64; 2], half: [f64; 2], low: f64, high: f64| {
         ([xy[0] - half[0], xy[1] - half[1], low], [xy[0] + half[0], xy[1] + half[1], high])
     };

@@ -186,23 +186,27 @@ impl SceneTriangles {
                 .map(|a| self.anchor(scene, models, a))
                 .collect::<Result<Vec<_>>>();
             let held = held.map_err(|e| e.at(format!("hose \"{}\"", hose.name)))?;
-            // A hose that is held only by the robot's root does not move.
-            let moves = |a: &&Anchor| {
-                a.link.as_ref().is_some_and(|link| !self.is_root(scene, models, a, link))
-            };
-            let owner = hose.anchors.iter().find(moves).and_then(|a| a.robot.as_ref());
-            let object = self.object("hose", &hose.name);
-            let surface = match owner {
-                Some(name) => attachment(robot_index(scene, name)?, object, BLACK)?,
-                None => BodySurface {
-                    label: Label::FIXED,
-                    object,
-                    reflectance: BLACK,
-                    is_thin: false,
-                    holder: -1,
-                },
-            };
-            self.add(surface, &attach::hose(hose, &held));
+            // A hose that is held only by links that no joint moves stands still.
+            let moves: Vec<bool> =
+                hose.anchors.iter().map(|a| self.is_moving(scene, models, a)).collect();
+            let owner = hose.anchors.iter().zip(&moves).find(|(_, moves)| **moves);
+            let owner = owner.and_then(|(anchor, _)| anchor.robot.as_ref());
+            for (moves, body) in attach::hose(hose, &held, &moves) {
+                let surface = match owner.filter(|_| moves) {
+                    Some(name) => {
+                        let object = self.object("hose", &hose.name);
+                        attachment(robot_index(scene, name)?, object, BLACK)?
+                    }
+                    None => BodySurface {
+                        label: Label::FIXED,
+                        object: self.object("line", &hose.name),
+                        reflectance: BLACK,
+                        is_thin: false,
+                        holder: -1,
+                    },
+                };
+                self.add(surface, &body);
+            }
         }
         Ok(())
     }
@@ -221,9 +225,15 @@ impl SceneTriangles {
         }
     }
 
-    fn is_root(&self, scene: &Scene, models: &[Model], anchor: &Anchor, link: &str) -> bool {
+    /// Whether an anchor is on a link that a joint moves.
+    fn is_moving(&self, scene: &Scene, models: &[Model], anchor: &Anchor) -> bool {
         let index = anchor.robot.as_ref().and_then(|name| robot_index(scene, name).ok());
-        index.is_none_or(|i| models[self.robots[i].model].links[0].name == link)
+        let on = index.zip(anchor.link.as_ref());
+        on.is_some_and(|(robot, name)| {
+            let model = &models[self.robots[robot].model];
+            let link = model.links.iter().position(|link| link.name == *name);
+            link.is_some_and(|link| model.moving()[link])
+        })
     }
 
     fn link_pose(

@@ -1,7 +1,7 @@
 //! Hoses, tools, workpieces and walls beside a two-link robot.
 
 use super::*;
-use contract::{JointFit, Verdict};
+use contract::{JointFit, PointKind, Verdict};
 use geometry::{Aabb, Pose, Vector};
 use robot::{Joint, JointKind, Link, Motion, Role};
 use std::sync::Arc;
@@ -88,12 +88,12 @@ fn a_workpiece_in_the_gripper_is_carried_whole() {
 }
 
 #[test]
-fn a_hose_to_the_floor_is_cut_and_a_touched_wall_is_not_lost() {
+fn a_hose_moves_up_to_the_floor_and_a_touched_wall_is_not_lost() {
     let mut hose: Vec<_> = (0..60).map(|z| voxel([0, 0, z], 1, z)).collect();
-    hose[59].grounded = true;
+    hose[57..].iter_mut().for_each(|v| v.grounded = true);
     let out = attached(&[hose]);
     let n = out.voxels.iter().filter(|v| v.1.kind == PointKind::Attachment).count();
-    assert_eq!(n, 8, "15 cm of it stay with the robot");
+    assert_eq!(n, 56, "it moves up to where it is held");
     let mut wall = Vec::new();
     for x in -30_i32..=30 {
         for y in -30_i32..=30 {
@@ -141,4 +141,85 @@ fn the_result_does_not_depend_on_the_order_of_parts() {
         attach.join(&mut a, b).expect("join");
         assert_eq!(attach.finish(a).expect("finish"), whole);
     }
+}
+
+/// The outside of a box between two corners.
+fn shell(min: Voxel, max: Voxel, voxel: impl Fn(Voxel) -> ResidualVoxel) -> Vec<ResidualVoxel> {
+    let mut out = Vec::new();
+    for x in min[0]..=max[0] {
+        for y in min[1]..=max[1] {
+            for z in min[2]..=max[2] {
+                let at = [x, y, z];
+                if (0..3).any(|i| at[i] == min[i] || at[i] == max[i]) {
+                    out.push(voxel(at));
+                }
+            }
+        }
+    }
+    out
+}
+
+/// A gripper of a body and two fingers below the arm at z = 0, and a part below them on a bench.
+fn gripper_on_a_part() -> [Vec<ResidualVoxel>; 3] {
+    let near = |at: Voxel| voxel(at, 1, -at[2]);
+    let mut tool = shell([-3, -2, -8], [3, 2, 0], near);
+    for x in [-3, 2] {
+        tool.extend(shell([x, -1, -16], [x + 1, 1, -9], near));
+    }
+    let part = shell([-7, -7, -26], [7, 7, -17], near);
+    let bench = shell([-30, -30, -28], [30, 30, -27], |at| ResidualVoxel {
+        at_border: at[0].abs() == 30,
+        ..near(at)
+    });
+    [tool, part, bench]
+}
+
+#[test]
+fn a_gripper_that_touches_a_part_moves_and_the_part_does_not() {
+    let parts = gripper_on_a_part();
+    let out = attached(&parts);
+    let [tool, part, bench] = &parts;
+    let n = |of: &[ResidualVoxel], kind: PointKind| {
+        of.iter().filter(|v| out.label(v.voxel).kind == kind).count()
+    };
+    assert!(n(tool, PointKind::Attachment) * 2 >= tool.len(), "half of it is near the flange");
+    assert!(n(tool, PointKind::Fixed) * 20 <= tool.len());
+    assert_eq!(n(part, PointKind::Attachment) + n(bench, PointKind::Attachment), 0);
+}
+
+#[test]
+fn a_plate_in_the_air_belongs_to_the_hand_beside_it_unless_a_bench_is_as_near() {
+    let link = ResidualVoxel { n_residual: 0, n_link: 9, ..voxel([0, 0, 0], 1, 0) };
+    let plate: Vec<_> =
+        (0..12).flat_map(|x| (0..8).map(move |y| voxel([x, y, -10], 1, 99))).collect();
+    let out = attached(&[vec![link], plate.clone()]);
+    assert_eq!(out.label([5, 5, -10]), Label { kind: PointKind::Attachment, robot: 0, link: 1 });
+    let bench = shell([-30, -30, -16], [30, 30, -15], |at| ResidualVoxel {
+        at_border: at[0].abs() == 30,
+        ..voxel(at, 1, 99)
+    });
+    let out = attached(&[vec![link], plate, bench]);
+    assert_eq!(out.label([5, 5, -10]), Label::UNCERTAIN);
+}
+
+#[test]
+fn a_hose_that_is_seen_sparsely_moves_up_to_where_it_is_held() {
+    // Its ends are whole, and between them every other voxel is missing.
+    let hose: Vec<_> = (0..80)
+        .filter(|k| !(6..74).contains(k) || k % 2 == 0)
+        .map(|k| ResidualVoxel { at_border: k >= 78, ..voxel([k / 2, k / 2, k], 1, k) })
+        .collect();
+    let out = attached(std::slice::from_ref(&hose));
+    let n = hose.iter().filter(|v| out.label(v.voxel).kind == PointKind::Attachment).count();
+    assert!(n >= 40, "{n} of {}", hose.len());
+}
+
+#[test]
+fn mixed_pixels_beside_a_carried_plate_do_not_hold_it() {
+    let link = ResidualVoxel { n_residual: 0, n_link: 9, ..voxel([0, 0, 0], 1, 0) };
+    let plate: Vec<_> =
+        (0..12).flat_map(|x| (0..8).map(move |y| voxel([x, y, -10], 1, 99))).collect();
+    let mixed = vec![voxel([5, 5, -14], 1, 99), voxel([5, 6, -18], 1, 99)];
+    let out = attached(&[vec![link], plate, mixed]);
+    assert_eq!(out.label([5, 5, -10]), Label { kind: PointKind::Attachment, robot: 0, link: 1 });
 }

@@ -1,0 +1,131 @@
+//! The least cut through a body between the robot that it touches and what is fixed.
+//!
+//! Voxels show the surface of a body, so that the edges between voxels that a cut goes through are
+//! its length along the surface: around the fingers of a gripper it is shorter than around the part
+//! that they touch. A cut through what is bolted to a flange costs more. A hose is cut where
+//! another body holds it, and not within, and a bench is not cut off its legs.
+
+use crate::max_flow::{FlowNetwork, UNCUT};
+use crate::thin::Shape;
+use crate::voxel_graph::Graph;
+use std::collections::BTreeMap;
+
+/// Cost of an edge between voxels that share a face, an edge or a corner.
+const EDGE_COST: [u64; 3] = [4, 2, 1];
+/// Cost of letting go of a voxel that is near the robot, and of one that touches it. A flat wall
+/// beside an arm is near it with an area, and the cut around that area costs more than letting go. A
+/// hose that begins near an arm is clamped to it.
+const NEAR_COST: u64 = 1;
+const TOUCH_COST: u64 = 400;
+/// Way along the body from the robot up to which a cut costs more, hundredths of a voxel's edge
+/// (14 cm), and how many times as much it costs at most: a tool is longer than its flange.
+const MOUNT: u32 = 700;
+const MOUNT_FACTOR: u64 = 3;
+/// Cost of giving a voxel of a wide flat surface to the robot where the cut near it is asked for:
+/// of what touches something fixed, such a surface rarely is a tool, but may be a carried part.
+const FLAT_COST: u64 = 100;
+/// Way along the body from a hand up to which other voxels are most likely a tool, hundredths of a
+/// voxel's edge (10 cm), and the cost of taking one from the robot.
+const BOLTED: u32 = 500;
+const BOLTED_COST: u64 = 4;
+/// Way along the body over which the cost grows by its value at the robot where the cut near the
+/// robot is asked for, hundredths of a voxel's edge (10 cm), and up to which it grows (40 cm).
+const DOUBLE: u32 = 500;
+const GROWS: u32 = 2000;
+/// All costs are multiplied by this, so that the factors act on whole numbers.
+const SCALE: u64 = 16;
+/// How many times more an edge within a thin part costs.
+const THIN_FACTOR: u64 = 1000;
+
+/// How a voxel touches a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Contact {
+    None,
+    Near,
+    Touch,
+}
+
+/// Which of the cuts that cost about as much is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Preference {
+    NearRobot,
+    NearFixed,
+}
+
+/// A body between a robot and what is fixed.
+pub(crate) struct Body<'a> {
+    pub(crate) graph: &'a Graph,
+    /// Its voxels by index.
+    pub(crate) members: &'a [usize],
+    /// For each of them, the way along the body from the robot, hundredths of a voxel's edge.
+    pub(crate) length: Vec<u32>,
+    /// Whether that way begins at a hand, which may carry a tool.
+    pub(crate) from_hand: Vec<bool>,
+    /// Way along the longest tool of the robot, hundredths of a voxel's edge.
+    pub(crate) longest_tool: u32,
+    pub(crate) contact: Vec<Contact>,
+    pub(crate) is_fixed: Vec<bool>,
+    pub(crate) shape: Vec<Shape>,
+}
+
+impl Body<'_> {
+    /// For each voxel, whether it is on the robot's side of the least cut.
+    pub(crate) fn robot_side(&self, preference: Preference) -> Vec<bool> {
+        let n = self.members.len();
+        let (source, sink) = (n, n + 1);
+        let place: BTreeMap<usize, usize> =
+            self.members.iter().enumerate().map(|(place, &at)| (at, place)).collect();
+        let mut network = FlowNetwork::new(n + 2);
+        for (k, &at) in self.members.iter().enumerate() {
+            match self.contact[k] {
+                Contact::None => {}
+                Contact::Near if self.shape[k] != Shape::Hose => {
+                    network.add(source, k, SCALE * NEAR_COST);
+                }
+                Contact::Near | Contact::Touch => network.add(source, k, SCALE * TOUCH_COST),
+            }
+            if self.shape[k] == Shape::Flat && preference == Preference::NearRobot {
+                network.add(k, sink, SCALE * FLAT_COST);
+            } else if self.from_hand[k] && self.length[k] <= BOLTED {
+                network.add(source, k, SCALE * BOLTED_COST);
+            }
+            if self.is_fixed[k] {
+                network.add(k, sink, UNCUT);
+            }
+            for (other, step) in self.graph.neighbours(at) {
+                let Some(&other) = place.get(&other).filter(|other| **other > k) else { continue };
+                let cost = self.cost(k, other, step, preference);
+                network.add_both(k, other, cost);
+            }
+        }
+        network.fill(source, sink);
+        let mut before = network.before_last_cut(sink);
+        before.truncate(n);
+        before
+    }
+
+    /// Cost of the edge between two voxels.
+    fn cost(&self, a: usize, b: usize, step: u32, preference: Preference) -> u64 {
+        let shared = [100, 141].iter().position(|length| step == *length).unwrap_or(2);
+        let length = self.length[a].min(self.length[b]);
+        let mut factor = SCALE;
+        if self.from_hand[a] && self.from_hand[b] {
+            let mounted = u64::from(MOUNT.saturating_sub(length)) * (MOUNT_FACTOR - 1) * SCALE;
+            factor += mounted / u64::from(MOUNT);
+        }
+        // A hose is as long as it is: nothing along it is nearer to the robot.
+        let is_hose = [a, b].iter().any(|k| self.shape[*k] == Shape::Hose);
+        if preference == Preference::NearRobot && !is_hose {
+            factor += u64::from(length.min(GROWS)) * SCALE / u64::from(DOUBLE);
+        }
+        // A hose is cut where another body holds it, and a leg nowhere.
+        let enters_hose = |from: usize, to: usize| {
+            let is_beyond = self.length[to] >= self.length[from];
+            is_beyond && self.shape[to] == Shape::Hose
+        };
+        let is_held = self.is_fixed[a] || self.is_fixed[b];
+        let in_hose = !is_held && (enters_hose(a, b) || enters_hose(b, a));
+        let in_leg = self.shape[a] == Shape::Leg || self.shape[b] == Shape::Leg;
+        EDGE_COST[shared] * factor * if in_hose || in_leg { THIN_FACTOR } else { 1 }
+    }
+}

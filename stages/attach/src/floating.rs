@@ -1,0 +1,138 @@
+//! Bodies that hang in the air: what holds them was not seen. A plate below a gripper whose fingers
+//! are hidden belongs to the gripper if the gripper is near and everything else is far.
+
+use crate::attached::{Decided, Group, attached_to, mark};
+use crate::near_voxels::NearVoxels;
+use contract::{Label, LinkAt, PointKind, ResidualVoxel};
+
+/// Least distance from everything fixed, metres, and in distances from the hand.
+const ALONE: f64 = 0.10;
+const ALONE_RATIO: f64 = 1.5;
+/// Largest gap between bits of the same body, metres: wires of a fence are so far apart, and bits
+/// of a sparsely seen tool.
+const BIT_GAP: f64 = 0.08;
+/// Components with fewer voxels are mixed pixels: they hang between a body and what is behind it,
+/// and tell nothing.
+const MIN_BIT: usize = 3;
+/// Bodies with fewer voxels are mixed pixels as well.
+const MIN_VOXELS: usize = 8;
+/// The residual voxels of a plant as bodies.
+pub(crate) struct Bodies<'a> {
+    /// Largest distance of a body from a hand or from what the hand carries, metres.
+    pub(crate) gap: f64,
+    pub(crate) voxels: &'a [ResidualVoxel],
+    /// Connected components of the voxels.
+    pub(crate) components: &'a [Vec<usize>],
+    /// Voxels that links fill.
+    pub(crate) links: &'a [ResidualVoxel],
+    pub(crate) is_fixed: &'a dyn Fn(&ResidualVoxel) -> bool,
+    pub(crate) is_hand: &'a dyn Fn(LinkAt) -> bool,
+}
+
+/// Attaches bodies that hang in the air to the hand that they are near, the nearest first.
+pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
+    let (mut hands, mut fixed) = (NearVoxels::default(), NearVoxels::default());
+    for voxel in bodies.links.iter().filter(|v| (bodies.is_hand)(v.nearest)) {
+        hands.add(voxel.voxel, mark(voxel.nearest));
+    }
+    let mut bits: Vec<&[usize]> = Vec::new();
+    for members in bodies.components {
+        let is_free = members
+            .iter()
+            .all(|&at| decided.labels[at].is_none() && !(bodies.is_fixed)(&bodies.voxels[at]));
+        if is_free {
+            if members.len() >= MIN_BIT {
+                bits.push(members);
+            }
+            continue;
+        }
+        for &at in members {
+            match decided.labels[at] {
+                None => fixed.add(bodies.voxels[at].voxel, 0),
+                Some(label) if label.kind == PointKind::Attachment => {
+                    let link = LinkAt { robot: label.robot as u16, link: label.link as u16 };
+                    if (bodies.is_hand)(link) {
+                        hands.add(bodies.voxels[at].voxel, mark(link));
+                    }
+                }
+                Some(_) => {}
+            }
+        }
+    }
+    let mut open = joined(bodies, &bits);
+    open.retain(|members| members.len() >= MIN_VOXELS);
+    while let Some((which, mark, label)) = nearest(bodies, &open, &hands, &fixed) {
+        let members = open.remove(which);
+        let mut group = Group {
+            link: LinkAt { robot: (mark >> 16) as u16, link: (mark & 0xffff) as u16 },
+            n_attached: 0,
+            n_uncertain: 0,
+            n_points: 0,
+            is_cut: false,
+        };
+        for at in members {
+            decided.labels[at] = Some(label);
+            if label == Label::UNCERTAIN {
+                group.n_uncertain += 1;
+            } else {
+                group.n_attached += 1;
+                group.n_points += u64::from(bodies.voxels[at].n_residual);
+                hands.add(bodies.voxels[at].voxel, mark);
+            }
+        }
+        decided.groups.push(group);
+    }
+}
+
+/// Joins bits with small gaps between them to bodies.
+fn joined(bodies: &Bodies<'_>, bits: &[&[usize]]) -> Vec<Vec<usize>> {
+    let mut bit_at = NearVoxels::default();
+    for (bit, members) in bits.iter().enumerate() {
+        members.iter().for_each(|&at| bit_at.add(bodies.voxels[at].voxel, bit as u32));
+    }
+    let mut is_taken = vec![false; bits.len()];
+    let mut out = Vec::new();
+    for first in 0..bits.len() {
+        if std::mem::replace(&mut is_taken[first], true) {
+            continue;
+        }
+        let (mut body, mut queue) = (Vec::new(), vec![first]);
+        while let Some(bit) = queue.pop() {
+            body.extend_from_slice(bits[bit]);
+            for &at in bits[bit] {
+                bit_at.around(bodies.voxels[at].voxel, BIT_GAP, |_, other| {
+                    if !std::mem::replace(&mut is_taken[other as usize], true) {
+                        queue.push(other as usize);
+                    }
+                });
+            }
+        }
+        body.sort_unstable();
+        out.push(body);
+    }
+    out
+}
+
+/// The body that is nearest to a hand and farther from everything fixed, by its place in `open`,
+/// with the mark of the hand and its label.
+fn nearest(
+    bodies: &Bodies<'_>,
+    open: &[Vec<usize>],
+    hands: &NearVoxels,
+    fixed: &NearVoxels,
+) -> Option<(usize, u32, Label)> {
+    let mut best: Option<(f64, usize, u32, Label)> = None;
+    for (which, members) in open.iter().enumerate() {
+        let places = || members.iter().map(|&at| bodies.voxels[at].voxel);
+        let Some((gap, mark)) = hands.nearest(places(), bodies.gap) else { continue };
+        if best.is_some_and(|b| b.0 <= gap) {
+            continue;
+        }
+        let apart =
+            fixed.nearest(places(), ALONE_RATIO * bodies.gap).map_or(f64::INFINITY, |f| f.0);
+        let is_alone = apart >= ALONE.max(ALONE_RATIO * gap);
+        let label = if is_alone { attached_to(mark) } else { Label::UNCERTAIN };
+        best = Some((gap, which, mark, label));
+    }
+    best.map(|(_, which, mark, label)| (which, mark, label))
+}
