@@ -26,6 +26,31 @@ fn help_and_version_are_no_failures() {
     assert_eq!(code(&stillpoint(&["--version"])), 0);
 }
 
+/// Completions and pages name all commands, those of `bench` and `robots` as well.
+#[test]
+fn completions_and_manual_pages_name_every_command() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = stillpoint(&["completions", shell]);
+        assert_eq!(code(&script), 0, "{}", err(&script));
+        let text = String::from_utf8_lossy(&script.stdout).into_owned();
+        for word in ["rescan", "calibrate", "throughput", "keep-going"] {
+            assert!(text.contains(word), "{shell}: {word}");
+        }
+    }
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = dir.path().join("man");
+    let output = stillpoint(&["manual", &out.to_string_lossy()]);
+    assert_eq!(code(&output), 0, "{}", err(&output));
+    for page in ["stillpoint", "stillpoint-run", "stillpoint-robots-calibrate"] {
+        let text = std::fs::read_to_string(out.join(format!("{page}.1"))).expect("a page");
+        assert!(text.starts_with(".ie") && text.contains(".SH NAME"), "{page}");
+    }
+    // A folder that cannot be made.
+    let file = dir.path().join("file");
+    std::fs::write(&file, "").expect("writes");
+    assert_eq!(code(&stillpoint(&["manual", &file.to_string_lossy()])), 1);
+}
+
 #[test]
 fn usage_is_two() {
     for args in [

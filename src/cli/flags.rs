@@ -58,6 +58,23 @@ pub(super) enum Command {
     /// Check and calibrate robot libraries
     #[command(subcommand)]
     Robots(RobotsCommand),
+    /// Print a script that completes commands and options in a shell
+    Completions(CompletionsFlags),
+    /// Write manual pages for `man`, one for each command
+    Manual(ManualFlags),
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CompletionsFlags {
+    /// The shell
+    pub(super) shell: clap_complete::Shell,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ManualFlags {
+    /// Folder of the pages, made if it is not there
+    #[arg(value_name = "DIR")]
+    pub(super) out: PathBuf,
 }
 
 #[derive(Debug, Subcommand)]

@@ -8,6 +8,7 @@ pub mod exit;
 mod flags;
 mod inspect;
 mod keep_going;
+mod manual;
 mod results;
 mod robots;
 mod run;
@@ -90,5 +91,7 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
         Command::Robots(RobotsCommand::Calibrate(flags)) => {
             robots::calibrate(flags, &line.common, say)
         }
+        Command::Completions(flags) => Ok(manual::completions(flags, say)),
+        Command::Manual(flags) => manual::manual(flags, say),
     }
 }

@@ -51,6 +51,12 @@ impl Say {
         let _ = writeln!(out, "{}", quote::printed(text.trim_end())).and_then(|()| out.flush());
     }
 
+    /// Writes bytes that the program made itself to standard output. A closed pipe is not an error.
+    pub(super) fn bytes(&self, bytes: &[u8]) {
+        let mut out = std::io::stdout().lock();
+        let _ = out.write_all(bytes).and_then(|()| out.flush());
+    }
+
     /// Writes the outcome of a run: warnings and pieces that were used again to standard error, the
     /// summary to standard output.
     pub(super) fn outcome(&self, outcome: &Outcome) {
