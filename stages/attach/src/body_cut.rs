@@ -8,7 +8,6 @@
 use crate::max_flow::{FlowNetwork, UNCUT};
 use crate::thin::Shape;
 use crate::voxel_graph::Graph;
-use std::collections::BTreeMap;
 
 /// Cost of an edge between voxels that share a face, an edge or a corner.
 const EDGE_COST: [u64; 3] = [4, 2, 1];
@@ -55,9 +54,7 @@ pub(crate) enum Preference {
 /// A body between a robot and what is fixed.
 pub(crate) struct Body<'a> {
     pub(crate) graph: &'a Graph,
-    /// Its voxels by index.
-    pub(crate) members: &'a [usize],
-    /// For each of them, the way along the body from the robot, hundredths of a voxel's edge.
+    /// For each of its voxels, the way along the body from the robot, hundredths of a voxel's edge.
     pub(crate) length: Vec<u32>,
     /// Whether that way begins at a hand, which may carry a tool.
     pub(crate) from_hand: Vec<bool>,
@@ -71,12 +68,10 @@ pub(crate) struct Body<'a> {
 impl Body<'_> {
     /// For each voxel, whether it is on the robot's side of the least cut.
     pub(crate) fn robot_side(&self, preference: Preference) -> Vec<bool> {
-        let n = self.members.len();
+        let n = self.graph.len();
         let (source, sink) = (n, n + 1);
-        let place: BTreeMap<usize, usize> =
-            self.members.iter().enumerate().map(|(place, &at)| (at, place)).collect();
         let mut network = FlowNetwork::new(n + 2);
-        for (k, &at) in self.members.iter().enumerate() {
+        for k in 0..n {
             match self.contact[k] {
                 Contact::None => {}
                 Contact::Near if self.shape[k] != Shape::Hose => {
@@ -92,8 +87,7 @@ impl Body<'_> {
             if self.is_fixed[k] {
                 network.add(k, sink, UNCUT);
             }
-            for (other, step) in self.graph.neighbours(at) {
-                let Some(&other) = place.get(&other).filter(|other| **other > k) else { continue };
+            for (other, step) in self.graph.neighbours(k).filter(|(other, _)| *other > k) {
                 let cost = self.cost(k, other, step, preference);
                 network.add_both(k, other, cost);
             }

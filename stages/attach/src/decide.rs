@@ -7,7 +7,7 @@ use crate::bridges::bridges;
 use crate::floating::{self, Bodies};
 use crate::settings::Settings;
 use crate::share::{Share, share};
-use crate::thin;
+use crate::thin::{self, Shape};
 use crate::voxel_graph::Graph;
 use contract::{Fit, Fold, Label, LinkAt, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
 use robot::{JointKind, Model};
@@ -39,6 +39,10 @@ const TOUCH: f32 = 0.012;
 /// welding gun of 1 m on an arm that reaches 3.1 m.
 const LONGEST_TOOL: f64 = 0.33;
 const LEAST_TOOL: f64 = 0.3;
+/// Way along a body, in longest tools and at least, hundredths of a voxel's edge (1.5 m), beyond
+/// which only hoses and legs are parts of what moves with a hand.
+const FAR_TOOLS: u32 = 3;
+const LEAST_FAR: u32 = 7500;
 /// Fewer fixed voxels than this, and less than one in so many of a component, are mixed pixels:
 /// they hang between the robot and what is behind it.
 const MIN_FIXED: usize = 3;
@@ -82,9 +86,7 @@ impl Attach {
         out: &mut Decided,
     ) {
         let (mut robot, mut marks) = (Vec::new(), Vec::new());
-        let in_contact = |at: usize| {
-            voxels[at].distance <= self.settings.contact && self.is_moving(voxels[at].nearest)
-        };
+        let in_contact = |at: usize| self.in_contact(&voxels[at]);
         for &at in members.iter().filter(|at| in_contact(**at)) {
             let mark = mark(voxels[at].nearest);
             robot.push((at, mark));
@@ -97,22 +99,7 @@ impl Attach {
         let is_cut = n_fixed >= MIN_FIXED || (n_fixed > 0 && n_fixed * FEW >= members.len());
         let mut group = Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut };
         let sides = if is_cut {
-            let length = |at: usize| paths[at].0;
-            let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
-                _ if !in_contact(*at) => Contact::None,
-                true => Contact::Touch,
-                false => Contact::Near,
-            };
-            share(&Body {
-                graph,
-                members,
-                length: members.iter().map(|at| length(*at)).collect(),
-                from_hand: members.iter().map(|at| self.is_hand(paths[*at].1)).collect(),
-                longest_tool: self.tools.get(usize::from(link.robot)).copied().unwrap_or(0),
-                contact: members.iter().map(contact).collect(),
-                is_fixed: members.iter().map(|at| is_fixed(*at)).collect(),
-                shape: thin::shapes(graph, members, length, self.settings.thin),
-            })
+            self.cut(&graph.part(members), voxels, members, paths, link)
         } else if members.len() < self.settings.min_voxels {
             vec![Share::Open; members.len()]
         } else {
@@ -133,6 +120,48 @@ impl Attach {
             }
         }
         out.groups.push(group);
+    }
+
+    /// Shares out a component that reaches something fixed; `graph` is that of the component alone.
+    fn cut(
+        &self,
+        graph: &Graph,
+        voxels: &[ResidualVoxel],
+        members: &[usize],
+        paths: &[(u32, u32)],
+        link: LinkAt,
+    ) -> Vec<Share> {
+        let length: Vec<u32> = members.iter().map(|at| paths[*at].0).collect();
+        let shape = thin::shapes(graph, &length, self.settings.thin);
+        let longest_tool = self.tools.get(usize::from(link.robot)).copied().unwrap_or(0);
+        // No tool and nothing that it holds is so far away, which bounds the time of the cuts.
+        let too_far = (FAR_TOOLS * longest_tool).max(LEAST_FAR);
+        let is_too_far =
+            |k: usize| length[k] > too_far && matches!(shape[k], Shape::Body | Shape::Flat);
+        let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
+            _ if !self.in_contact(&voxels[*at]) => Contact::None,
+            true => Contact::Touch,
+            false => Contact::Near,
+        };
+        let is_fixed = |k: usize| {
+            let voxel = &voxels[members[k]];
+            is_too_far(k) || !self.in_contact(voxel) && self.is_fixed(voxel)
+        };
+        let is_fixed = (0..members.len()).map(is_fixed).collect();
+        share(&Body {
+            graph,
+            from_hand: members.iter().map(|at| self.is_hand(paths[*at].1)).collect(),
+            longest_tool,
+            contact: members.iter().map(contact).collect(),
+            is_fixed,
+            shape,
+            length,
+        })
+    }
+
+    /// Whether a voxel touches a link that moves.
+    fn in_contact(&self, voxel: &ResidualVoxel) -> bool {
+        voxel.distance <= self.settings.contact && self.is_moving(voxel.nearest)
     }
 
     /// Whether the link of a mark may carry a tool or a part.

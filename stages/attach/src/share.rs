@@ -3,7 +3,6 @@
 
 use crate::body_cut::{Body, Preference};
 use crate::thin::Shape;
-use std::collections::BTreeMap;
 
 /// Way along a body from where it touches a robot up to which nothing of it is called fixed because
 /// of a cut alone, hundredths of a voxel's edge (15 cm): there may be a tool.
@@ -30,22 +29,21 @@ pub(crate) enum Share {
 pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let mut near = body.robot_side(Preference::NearRobot);
     let far = body.robot_side(Preference::NearFixed);
-    let sides = Sides::new(body);
     let is_hose = |k: usize| body.shape[k] == Shape::Hose;
-    let n = body.members.len();
+    let n = body.graph.len();
     // A cut that leaves more than a tool on the robot's side has not found where the tool ends, nor
     // has one behind which the body is as wide as at the cut.
     let held = if (0..n).any(|k| near[k] && !is_hose(k) && body.length[k] > body.longest_tool) {
         MOUNT
-    } else if let Some(side) = sides.up_to_where_it_widens(&near) {
+    } else if let Some(side) = up_to_where_it_widens(body, &near) {
         near = side;
         body.longest_tool
     } else {
         DOUBT
     };
     // One voxel beside a cut may be on either side of it, and two where it is no hose that is cut.
-    let once = sides.inside(&near);
-    let twice = sides.inside(&once);
+    let once = inside(body, &near);
+    let twice = inside(body, &once);
     let share = |k: usize| {
         let is_held = twice[k] && body.length[k] <= held || once[k] && is_hose(k);
         match (near[k], far[k]) {
@@ -57,65 +55,43 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     (0..n).map(share).collect()
 }
 
-/// Looks at sides of cuts through a body.
-struct Sides<'a> {
-    body: &'a Body<'a>,
-    /// The place of each voxel among the members of the body.
-    place: BTreeMap<usize, usize>,
+/// A side without its voxels beside the cut.
+fn inside(body: &Body<'_>, side: &[bool]) -> Vec<bool> {
+    let is_inside = |k: usize| side[k] && body.graph.neighbours(k).all(|(other, _)| side[other]);
+    (0..side.len()).map(is_inside).collect()
 }
 
-impl<'a> Sides<'a> {
-    fn new(body: &'a Body<'a>) -> Self {
-        let place = body.members.iter().enumerate().map(|(place, &at)| (at, place)).collect();
-        Self { body, place }
-    }
+/// A side together with what follows behind its cut, up to where the body becomes half as wide
+/// again, as where a tip touches a part: a finger is cut anywhere along its length. `None` if that
+/// is not found near the cut.
+fn up_to_where_it_widens(body: &Body<'_>, side: &[bool]) -> Option<Vec<bool>> {
+    let layers = layers_behind(body, side);
+    let width = |at: usize| layers[at].len() + layers[at + 1].len();
+    let widens = |at: &usize| {
+        let behind = width(at + N_LAYERS - 2);
+        behind > 0 && 2 * behind >= 3 * width(*at)
+    };
+    let n_before = (0..N_FOLLOWED).find(widens)?;
+    let mut side = side.to_vec();
+    layers[..n_before].iter().flatten().for_each(|k| side[*k] = true);
+    Some(side)
+}
 
-    /// The places of the voxels beside one.
-    fn beside(&self, k: usize) -> impl Iterator<Item = usize> + '_ {
-        let neighbours = self.body.graph.neighbours(self.body.members[k]);
-        neighbours.filter_map(|(other, _)| self.place.get(&other).copied())
-    }
-
-    /// A side without its voxels beside the cut.
-    fn inside(&self, side: &[bool]) -> Vec<bool> {
-        (0..side.len()).map(|k| side[k] && self.beside(k).all(|other| side[other])).collect()
-    }
-
-    /// A side together with what follows behind its cut, up to where the body becomes wider: a
-    /// finger is cut anywhere along its length. `None` if that is not found near the cut.
-    fn up_to_where_it_widens(&self, side: &[bool]) -> Option<Vec<bool>> {
-        let mut side = side.to_vec();
-        for _ in 0..N_FOLLOWED {
-            if self.widens_behind(&side) {
-                return Some(side);
-            }
-            for k in self.layer_behind(&side) {
-                side[k] = true;
+/// The voxels behind a cut in layers, the nearest first.
+fn layers_behind(body: &Body<'_>, side: &[bool]) -> Vec<Vec<usize>> {
+    let mut is_seen = side.to_vec();
+    let mut layer: Vec<usize> = (0..side.len()).filter(|k| side[*k]).collect();
+    let next = |_| {
+        let mut next = Vec::new();
+        for k in &layer {
+            for (other, _) in body.graph.neighbours(*k) {
+                if !std::mem::replace(&mut is_seen[other], true) {
+                    next.push(other);
+                }
             }
         }
-        None
-    }
-
-    /// Whether the body becomes half as wide again behind a cut, as where a tip touches a part.
-    fn widens_behind(&self, side: &[bool]) -> bool {
-        let layers = self.layers_behind(side);
-        let behind = layers[N_LAYERS - 2] + layers[N_LAYERS - 1];
-        behind > 0 && 2 * behind >= 3 * (layers[0] + layers[1])
-    }
-
-    /// Numbers of voxels in the layers behind a cut.
-    fn layers_behind(&self, side: &[bool]) -> [usize; N_LAYERS] {
-        let mut side = side.to_vec();
-        [(); N_LAYERS].map(|()| {
-            let layer = self.layer_behind(&side);
-            layer.iter().for_each(|k| side[*k] = true);
-            layer.len()
-        })
-    }
-
-    /// The voxels beside a side that are not on it.
-    fn layer_behind(&self, side: &[bool]) -> Vec<usize> {
-        let is_behind = |k: &usize| !side[*k] && self.beside(*k).any(|other| side[other]);
-        (0..side.len()).filter(is_behind).collect()
-    }
+        layer.clone_from(&next);
+        next
+    };
+    (0..N_FOLLOWED + N_LAYERS).map(next).collect()
 }

@@ -3,7 +3,6 @@
 
 use crate::voxel_graph::Graph;
 use contract::{RESIDUAL_EDGE, Voxel};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// Distance around a voxel within which the shape of the body counts, voxels: 10 cm.
 const AROUND: i64 = 5;
@@ -37,103 +36,85 @@ pub(crate) enum Shape {
     Flat,
 }
 
-/// The shape around each member of a component. `length` is the way along the body from the robot
-/// to each voxel of the graph (hundredths of a voxel's edge), and `thin` the largest circumference
-/// of a thin part, metres.
-pub(crate) fn shapes(
-    graph: &Graph,
-    members: &[usize],
-    length: impl Fn(usize) -> u32,
-    thin: f64,
-) -> Vec<Shape> {
-    let place: BTreeMap<usize, usize> =
-        members.iter().enumerate().map(|(place, &at)| (at, place)).collect();
-    let around: Vec<([f64; 3], usize)> = members.iter().map(|at| spreads(graph, *at)).collect();
+/// The shape around each voxel of a component. `length` is the way along the body from the robot to
+/// each of them (hundredths of a voxel's edge), and `thin` the largest circumference of a thin part,
+/// metres.
+pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<Shape> {
+    let n = graph.len();
+    let mut ball = Ball { graph, seen_for: vec![usize::MAX; n], members: Vec::new() };
+    let around: Vec<([f64; 3], usize)> = (0..n).map(|at| ball.spreads(at)).collect();
     let is_thin: Vec<bool> =
         around.iter().map(|(spread, _)| is_line(spread, thin, MIN_RATIO)).collect();
-    let begins = |k: &usize| length(members[*k]) <= BEGINS;
-    let is_reached = reached(graph, members, &place, (0..members.len()).filter(begins), &is_thin);
     let shape = |(spread, n): &([f64; 3], usize)| match is_line(spread, thin, MIN_RATIO) {
         true => Shape::Leg,
         false if is_flat(spread, *n) => Shape::Flat,
         false => Shape::Body,
     };
     let mut shapes: Vec<Shape> = around.iter().map(shape).collect();
-    let part = |first: usize, is_seen: &mut [bool]| {
-        is_seen[first] = true;
-        let mut part = vec![first];
-        let mut next = 0;
-        while let Some(&k) = part.get(next) {
-            next += 1;
-            for (other, _) in graph.neighbours(members[k]) {
-                if let Some(&other) = place.get(&other)
-                    && is_thin[other]
-                    && is_reached[other]
-                    && !is_seen[other]
-                {
-                    is_seen[other] = true;
-                    part.push(other);
-                }
-            }
-        }
-        part
-    };
-    let mut is_seen = vec![false; members.len()];
-    for first in 0..members.len() {
-        if is_thin[first] && is_reached[first] && !is_seen[first] {
-            let part = part(first, &mut is_seen);
-            let ways = || part.iter().map(|k| length(members[*k]));
+    let beginnings = (0..n).filter(|k| length[*k] <= BEGINS).collect();
+    let mut is_left = is_thin.clone();
+    let mut is_hose = vec![false; n];
+    for k in reached(graph, beginnings, &mut is_left) {
+        is_hose[k] = is_thin[k];
+    }
+    for first in 0..n {
+        if is_hose[first] {
+            let part = reached(graph, vec![first], &mut is_hose);
+            let ways = || part.iter().map(|k| length[*k]);
             let span = ways().max().unwrap_or(0) - ways().min().unwrap_or(0);
             let shape = if span >= MIN_HOSE { Shape::Hose } else { Shape::Body };
-            part.iter().for_each(|k| shapes[*k] = shape);
+            part.into_iter().for_each(|k| shapes[k] = shape);
         }
     }
     shapes
 }
 
-/// The members that are reached from some of them through thin ones, and these themselves.
-fn reached(
-    graph: &Graph,
-    members: &[usize],
-    place: &BTreeMap<usize, usize>,
-    from: impl Iterator<Item = usize>,
-    is_thin: &[bool],
-) -> Vec<bool> {
-    let mut is_reached = vec![false; members.len()];
-    let mut queue: Vec<usize> = from.collect();
-    queue.iter().for_each(|k| is_reached[*k] = true);
-    while let Some(k) = queue.pop() {
-        for (other, _) in graph.neighbours(members[k]) {
-            if let Some(&other) = place.get(&other)
-                && is_thin[other]
-                && !is_reached[other]
-            {
-                is_reached[other] = true;
-                queue.push(other);
+/// The voxels that are reached from some of them, with these, through those that are left; they are
+/// taken away from what is left.
+fn reached(graph: &Graph, mut from: Vec<usize>, is_left: &mut [bool]) -> Vec<usize> {
+    from.iter().for_each(|k| is_left[*k] = false);
+    let mut next = 0;
+    while let Some(&k) = from.get(next) {
+        next += 1;
+        for (other, _) in graph.neighbours(k) {
+            if std::mem::replace(&mut is_left[other], false) {
+                from.push(other);
             }
         }
     }
-    is_reached
+    from
 }
 
-/// Standard deviations of the body around a voxel along its three main directions, voxels,
-/// ascending, from its connected voxels within [`AROUND`]; and their number.
-fn spreads(graph: &Graph, at: usize) -> ([f64; 3], usize) {
-    let centre = graph.voxel(at);
-    let by =
-        |other: usize| [0, 1, 2].map(|i| i64::from(graph.voxel(other)[i]) - i64::from(centre[i]));
-    let mut near = BTreeSet::from([at]);
-    let mut queue = vec![at];
-    while let Some(next) = queue.pop() {
-        for (other, _) in graph.neighbours(next) {
-            let square: i64 = by(other).iter().map(|v| v * v).sum();
-            if square <= AROUND * AROUND && near.insert(other) {
-                queue.push(other);
+/// Gathers the connected voxels around one.
+struct Ball<'a> {
+    graph: &'a Graph,
+    /// For each voxel the one for which it was last gathered.
+    seen_for: Vec<usize>,
+    members: Vec<Voxel>,
+}
+
+impl Ball<'_> {
+    /// Standard deviations of the body around a voxel along its three main directions, voxels,
+    /// ascending, from its connected voxels within [`AROUND`]; and their number.
+    fn spreads(&mut self, at: usize) -> ([f64; 3], usize) {
+        let centre = self.graph.voxel(at);
+        self.members.clear();
+        self.members.push(centre);
+        self.seen_for[at] = at;
+        let mut queue = vec![at];
+        while let Some(next) = queue.pop() {
+            for (other, _) in self.graph.neighbours(next) {
+                let voxel = self.graph.voxel(other);
+                let by = |i: usize| (i64::from(voxel[i]) - i64::from(centre[i])).pow(2);
+                if by(0) + by(1) + by(2) <= AROUND * AROUND && self.seen_for[other] != at {
+                    self.seen_for[other] = at;
+                    self.members.push(voxel);
+                    queue.push(other);
+                }
             }
         }
+        (spreads_of(&self.members, centre), self.members.len())
     }
-    let near: Vec<Voxel> = near.into_iter().map(|other| graph.voxel(other)).collect();
-    (spreads_of(&near, centre), near.len())
 }
 
 /// Standard deviations of voxels along their three main directions, voxels, ascending. `centre` is

@@ -60,6 +60,22 @@ impl Graph {
         Self { voxels: self.voxels, ..graph }
     }
 
+    /// The graph of a connected component alone. Its voxels keep their order.
+    pub(crate) fn part(&self, members: &[usize]) -> Self {
+        let place = |at: usize| members.binary_search(&at).unwrap_or_default();
+        let mut part =
+            Self { voxels: Vec::new(), starts: vec![0], to: Vec::new(), steps: Vec::new() };
+        for &at in members {
+            part.voxels.push(self.voxels[at]);
+            for (other, step) in self.neighbours(at) {
+                part.to.push(place(other) as u32);
+                part.steps.push(step);
+            }
+            part.starts.push(part.to.len());
+        }
+        part
+    }
+
     /// The voxel with an index.
     pub(crate) fn voxel(&self, at: usize) -> Voxel {
         self.voxels[at]
