@@ -3,6 +3,7 @@
 
 use crate::body_cut::{Body, Preference};
 use crate::thin::Shape;
+use std::collections::BTreeMap;
 
 /// Way along a body from where it touches a robot up to which nothing of it is called fixed because
 /// of a cut alone, hundredths of a voxel's edge (15 cm): there may be a tool.
@@ -10,6 +11,11 @@ const DOUBT: u32 = 750;
 /// Way along a body up to which it is bolted to the robot whatever follows, hundredths of a voxel's
 /// edge (4 cm).
 const MOUNT: u32 = 200;
+/// Largest number of voxels of a tool in two neighbouring levels: a level plate of 25 cm by 25 cm.
+/// What is wider is the top of a bench or a part that the tool touches.
+const MAX_LEVEL: usize = 150;
+/// Way along a body over which its voxels are counted as one layer, hundredths of a voxel's edge.
+const LAYER: u32 = 100;
 /// Number of layers of voxels behind a cut that are counted: 12 cm.
 const N_LAYERS: usize = 6;
 /// Number of layers of voxels behind a cut in which the end of a tool is looked for: 20 cm.
@@ -32,8 +38,8 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let is_hose = |k: usize| body.shape[k] == Shape::Hose;
     let n = body.graph.len();
     // A cut that leaves more than a tool on the robot's side has not found where the tool ends, nor
-    // has one behind which the body is as wide as at the cut.
-    let held = if (0..n).any(|k| near[k] && !is_hose(k) && body.length[k] > body.longest_tool) {
+    // has one behind which the body is as wide as at the cut: a bench would go with the tool.
+    let held = if !is_like_a_tool(body, &near) {
         MOUNT
     } else if let Some(side) = up_to_where_it_widens(body, &near) {
         near = side;
@@ -53,6 +59,25 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
         }
     };
     (0..n).map(share).collect()
+}
+
+/// Whether what is on the robot's side of a cut may be a tool, hoses aside: it is no longer than
+/// one, has no wide level surface, and becomes no wider far from the hand, as a bench does behind
+/// the tip that touches it.
+fn is_like_a_tool(body: &Body<'_>, side: &[bool]) -> bool {
+    let (mut widths, mut levels) = (BTreeMap::new(), BTreeMap::new());
+    for k in (0..side.len()).filter(|k| side[*k] && body.shape[*k] != Shape::Hose) {
+        if body.length[k] > body.longest_tool {
+            return false;
+        }
+        *widths.entry(body.length[k] / LAYER).or_insert(0_usize) += 1;
+        *levels.entry(body.graph.voxel(k)[2]).or_insert(0_usize) += 1;
+    }
+    let width = |at: u32| widths.get(&at).copied().unwrap_or(0);
+    let at_hand = widths.range(..DOUBT / LAYER).map(|(_, n)| *n).max().unwrap_or(0);
+    let is_wider = |at: &u32| 2 * (width(*at) + width(at + 1) + width(at + 2)) > 9 * at_hand;
+    let is_wide = |(at, n): (&i32, &usize)| n + levels.get(&(at + 1)).unwrap_or(&0) > MAX_LEVEL;
+    !widths.keys().filter(|at| **at >= DOUBT / LAYER).any(is_wider) && !levels.iter().any(is_wide)
 }
 
 /// A side without its voxels beside the cut.
