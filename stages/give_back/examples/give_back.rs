@@ -1,7 +1,7 @@
 //! Gives an E57 or PTX file back with labels from NumPy arrays, as `stillpoint export` does with
 //! those of a result: `give_back ORIGINAL OUT LABELS [--drop-moving] [--without-labels]`, where
-//! LABELS holds `N.kind.npy`, `N.robot.npy` and `N.link.npy` of scan N. `scripts/cross/scans_back.py`
-//! compares what comes out by other readers.
+//! LABELS holds `N.kind.npy`, `N.robot.npy` and `N.link.npy` of scan N. What comes out is compared
+//! by other readers in `scripts/cross/scans_back.py`.
 
 use contract::{Error, Label, Map, PointKind, Result, XmlLimits};
 use give_back::{
@@ -47,10 +47,10 @@ fn e57(original: &Path, out: &Path, labels: &Path, how: GiveBack) -> Result<()> 
     let xml = XmlLimits { max_nodes: 2_000_000, max_attributes: 256, room: "ingest" };
     let limits = DescriptionLimits { max_bytes: 16 << 20, xml };
     let (layout, mut pages) = E57Layout::open(File::open(original)?, &limits)?;
-    let links: Vec<String> = (0..9).map(|n| format!("link {n}")).collect();
+    let links: Vec<String> = (0..64).map(|n| format!("link {n}")).collect();
     let robot =
         |n: usize| RobotNames { id: format!("R{n}"), model: "m".into(), links: links.clone() };
-    let robots: Vec<RobotNames> = (1..10).map(robot).collect();
+    let robots: Vec<RobotNames> = (1..65).map(robot).collect();
     let file = File::options().read(true).write(true).create(true).truncate(true).open(out)?;
     let mut copy = E57Copy::begin(file, &layout, how, &robots)?;
     for section in &layout.sections {

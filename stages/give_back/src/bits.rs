@@ -104,7 +104,7 @@ const HALF: u64 = u32::MAX as u64;
 pub(crate) struct BitPacker {
     bytes: Vec<u8>,
     n_bits: u64,
-    word: u128,
+    word: u64,
     held: u32,
 }
 
@@ -117,13 +117,17 @@ impl BitPacker {
     /// Appends the lowest `bits` bits of a number; the others must be zero.
     #[inline]
     pub(crate) fn push(&mut self, value: u64, bits: u32) {
-        self.word |= u128::from(value) << self.held;
+        if bits > 32 {
+            self.push(value & HALF, 32);
+            return self.push(value >> 32, bits - 32);
+        }
+        self.word |= value << self.held;
         self.held += bits;
         self.n_bits += u64::from(bits);
-        if self.held >= 64 {
-            self.bytes.extend_from_slice(&(self.word as u64).to_le_bytes());
-            self.word >>= 64;
-            self.held -= 64;
+        if self.held >= 32 {
+            self.bytes.extend_from_slice(&(self.word as u32).to_le_bytes());
+            self.word >>= 32;
+            self.held -= 32;
         }
     }
 

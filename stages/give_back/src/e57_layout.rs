@@ -1,6 +1,6 @@
 //! Finds in the XML description of an E57 file where its binary sections lie, which fields its
-//! scans have, and where the text is edited. Nothing else of the description is interpreted, so that
-//! everything else stays as it is.
+//! scans have, and where the text is edited. Nothing else of the description is interpreted, so
+//! that everything else stays as it is.
 
 use crate::checked_pages::{CheckedPages, MOST, PAGE};
 use crate::e57_nodes::{count, end_tag, inside, is_ours, standard_child, value_at};
