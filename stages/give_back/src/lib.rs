@@ -1,6 +1,6 @@
 //! Gives a scan file back without its moving points: the bytes of the original and the labels of
-//! its points become a file with the same scans, poses, grids, colours, pictures and metadata, in which
-//! moving points are flagged as invalid or left out.
+//! its points become a file with the same scans, poses, grids, colours, pictures and metadata, in
+//! which moving points are flagged as invalid or left out.
 //!
 //! Everything that is not understood stays as it is: of an E57 file only the records of points and
 //! a few places of its description are rewritten, of a PTX file only lines of moving points. The
