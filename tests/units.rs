@@ -13,6 +13,11 @@ const FEET: &str = r#"PROJCS["Texas South Central (ftUS)",GEOGCS["NAD83",DATUM["
     SPHEROID["GRS 1980",6378137,298.257]],UNIT["degree",0.0174532925199433]],
     UNIT["US survey foot",0.3048006096012192],AXIS["X",EAST],AXIS["Y",NORTH]]"#;
 
+/// A map in metres.
+const METRES: &str = r#"PROJCS["ETRS89 / UTM zone 32N",GEOGCS["ETRS89",DATUM["ETRS89",
+    SPHEROID["GRS 1980",6378137,298.257]],UNIT["degree",0.0174532925199433]],
+    UNIT["metre",1],AXIS["E",EAST],AXIS["N",NORTH]]"#;
+
 /// A room of 6 × 5 × 3 m: floor and two walls, a point about every 0.1 m, in no coarse step.
 fn room() -> Vec<[f64; 3]> {
     // Points at the ends of a surface stay where they are, so that bounds are known.
@@ -210,6 +215,30 @@ fn inputs_of_several_units_become_one_cloud_in_metres() {
     // What is in metres is not said to be in feet.
     for tile in &tiles {
         let bytes = std::fs::read(tile).expect("a tile");
+        assert!(!bytes.windows(15).any(|w| w == b"LASF_Projection"), "{}", tile.display());
+    }
+}
+
+#[test]
+fn a_system_in_metres_stands_in_every_tile() {
+    let (place, room) = (Place::new(), room());
+    place.write("hall.las", las(&room, 1.0, STEPS, METRES));
+    let output = place.run(&["hall.las"]);
+    assert_eq!(code(&output), 0, "{}", err(&output));
+    let tiles = files(&place.path("out/tiles"), ".las");
+    assert_eq!(content(&tiles).0, room.len() as u64);
+    for tile in &tiles {
+        let bytes = std::fs::read(tile).expect("a tile");
+        let has = |what: &[u8]| bytes.windows(what.len()).any(|w| w == what);
+        assert!(has(METRES.as_bytes()) && has(b"LASF_Projection"), "{}", tile.display());
+        assert_eq!(bytes[6] & 16, 16, "the text counts: {}", tile.display());
+    }
+    // Inputs that state different systems are not said to be in one of them.
+    place.write("other.las", las(&room, 1.0, STEPS, &METRES.replace("32N", "33N")));
+    let output = place.run(&["hall.las", "other.las"]);
+    assert_eq!(code(&output), 0, "{}", err(&output));
+    for tile in files(&place.path("out/tiles"), ".las") {
+        let bytes = std::fs::read(&tile).expect("a tile");
         assert!(!bytes.windows(15).any(|w| w == b"LASF_Projection"), "{}", tile.display());
     }
 }

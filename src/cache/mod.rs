@@ -7,6 +7,7 @@
 
 mod digests;
 mod file_digests;
+mod given_input;
 pub(crate) mod input_tiles;
 mod key;
 mod manifest;
@@ -16,6 +17,7 @@ mod publish;
 mod verified;
 
 pub(crate) use digests::Digests;
+pub(crate) use given_input::GivenInput;
 pub(crate) use key::Key;
 #[cfg(fuzzing)]
 pub(crate) use manifest::sealed;

@@ -176,8 +176,8 @@ pub(super) struct ExportFlags {
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
     /// Format; files are written to OUT/export. A later run into OUT removes files of points
-    /// (copc, ply) if the points have changed, and reports it; scenes stay, and those of an
-    /// earlier result are named
+    /// (copc, ply) if the points have changed, and reports it; scenes and scans (e57, ptx) stay,
+    /// and those of an earlier result are named
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: ExportFormat,
     /// Robot library, for scenes (default: that of the run)
@@ -187,6 +187,16 @@ pub(super) struct ExportFlags {
     /// package://NAME/... (default: relative paths)
     #[arg(long, value_name = "NAME")]
     pub(super) package: Option<String>,
+    /// Folder in which the scans lie now, for e57 and ptx (default: where the run found them)
+    #[arg(long, value_name = "DIR")]
+    pub(super) inputs: Option<PathBuf>,
+    /// Leave moving points out instead of flagging them as invalid, for e57; rows and columns of
+    /// the others stay
+    #[arg(long)]
+    pub(super) drop_moving: bool,
+    /// Write no classes, robots and links, for e57: for readers that refuse extensions
+    #[arg(long)]
+    pub(super) without_labels: bool,
 }
 
 #[derive(Debug, Args)]

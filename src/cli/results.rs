@@ -14,11 +14,12 @@ use crate::result::changes::{changes, words};
 use crate::result::conversion::convert;
 use crate::result::history;
 use crate::result::page::{page_data, write_page};
+use crate::result::scans_back::{ScansBack, give_scans_back};
 use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
 use crate::{cache, check};
 use contract::words::count;
-use contract::{Error, Kind, Result};
-use std::path::Path;
+use contract::{Error, Format, Kind, Result};
+use std::path::{Path, PathBuf};
 
 pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8> {
     let engine = common.engine(&common.means()?)?;
@@ -69,6 +70,18 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
     flags_fit(flags, scene)?;
     let means = common.means()?;
     let engine = common.engine(&means)?;
+    if let Some(format) = flags.to.scans() {
+        let request = ScansBack {
+            out: flags.out.clone(),
+            format,
+            inputs: flags.inputs.clone(),
+            drops: flags.drop_moving,
+            says_labels: !flags.without_labels,
+        };
+        let (written, notes) = give_scans_back(&request, &means, &engine)?;
+        notes.iter().for_each(|note| engine.progress.say(note));
+        return Ok(say_paths(&written, say));
+    }
     let written = match scene {
         Some(format) => {
             let request = SceneRequest {
@@ -83,14 +96,29 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
         }
         None => convert(&flags.out, flags.to, &engine)?,
     };
-    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
-    say.result(&names.join("\n"));
-    Ok(exit::OK)
+    Ok(say_paths(&written, say))
 }
 
-/// Refuses flags of scenes where none of them is written, and names that no ROS package has.
+fn say_paths(written: &[PathBuf], say: &Say) -> u8 {
+    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
+    say.result(&names.join("\n"));
+    exit::OK
+}
+
+/// Refuses flags of other formats than the one that is written, and names that no ROS package has.
 fn flags_fit(flags: &ExportFlags, scene: Option<SceneFormat>) -> Result<()> {
     let usage = |what: String, hint: &str| Err(Error::new(Kind::Usage, what).hint(hint));
+    let scans = flags.to.scans();
+    if scans.is_none() && flags.inputs.is_some() {
+        return usage("--inputs is for e57 and ptx".into(), "leave it out for this format");
+    }
+    if scans != Some(Format::E57) && (flags.drop_moving || flags.without_labels) {
+        let what = "--drop-moving and --without-labels are for e57";
+        return usage(
+            what.into(),
+            "leave them out for this format: a PTX has a line for each beam",
+        );
+    }
     if scene.is_none() && flags.robots.is_some() {
         return usage("--robots is for scenes".into(), "leave it out for this format");
     }

@@ -19,8 +19,8 @@ use crate::store::Store;
 use attach::AttachedPieces;
 use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
 use export::{
-    Clouds, FileSum, LasSettings, Pack, PlanPicture, Quantum, RobotPicture, SpaceEntry, Spool,
-    Tiles, WrittenFiles, write_space,
+    Clouds, FileSum, LasSettings, PROJECTION, Pack, PlanPicture, Quantum, RawVlr, RobotPicture,
+    SpaceEntry, Spool, Tiles, WrittenFiles, write_space,
 };
 use geometry::{Aabb, Pose};
 use ingest::{Sources, Want};
@@ -331,7 +331,16 @@ impl<'a> Labelling<'a> {
 
     fn las(&self) -> LasSettings {
         let with_color = self.sources.has_color();
-        LasSettings { with_color, ..LasSettings::new(self.quantum()) }
+        // Tiles are in the same coordinates as the LAS inputs, so that they share their system.
+        let system = self.sources.system().into_iter().flat_map(|system| &system.records);
+        let vlrs = system.map(|(record_id, data)| RawVlr {
+            user_id: PROJECTION.into(),
+            record_id: *record_id,
+            description: String::new(),
+            data: data.clone(),
+        });
+        let vlrs = vlrs.collect();
+        LasSettings { with_color, vlrs, ..LasSettings::new(self.quantum()) }
     }
 
     /// Scale and offset of the clouds: those of a LAS input where they are valid for all points, so

@@ -8,11 +8,11 @@ use crate::cache::{EXPORT, VerifiedFiles, copc_name};
 use crate::engine::{Amount, Engine};
 use crate::io::own_paths::without_links;
 use crate::job::Job;
-use contract::{Error, Kind, Result};
+use contract::{Error, Format, Kind, Result};
 use export::{PLY, write_ply};
 use std::path::{Path, PathBuf};
 
-/// Formats that a result can be exported to: of points, and of scenes.
+/// Formats that a result can be exported to: of points, of scenes, and of the scans themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum ExportFormat {
     /// One LAZ file of all points, as an octree that viewers load piece by piece (Potree, QGIS)
@@ -39,14 +39,29 @@ pub enum ExportFormat {
     /// Distances of voxels around each robot from what stands still, as NumPy arrays (cuRobo,
     /// nvblox)
     Distance,
+    /// Each E57 input as it was, with moving points flagged as invalid; class, robot and link of
+    /// each point as an extension
+    E57,
+    /// Each PTX input as it was, with moving points as beams without return
+    Ptx,
 }
 
 impl ExportFormat {
+    /// The format as one of the scans that were read; `None` for one of points or scenes.
+    #[must_use]
+    pub fn scans(self) -> Option<Format> {
+        match self {
+            Self::E57 => Some(Format::E57),
+            Self::Ptx => Some(Format::Ptx),
+            _ => None,
+        }
+    }
+
     /// The format as one of scenes; `None` for one of points.
     #[must_use]
     pub fn scene(self) -> Option<SceneFormat> {
         match self {
-            Self::Copc | Self::Ply | Self::Distance => None,
+            Self::Copc | Self::Ply | Self::Distance | Self::E57 | Self::Ptx => None,
             Self::Urdf => Some(SceneFormat::Urdf),
             Self::Srdf => Some(SceneFormat::Srdf),
             Self::Moveit => Some(SceneFormat::Moveit),

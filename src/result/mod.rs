@@ -13,4 +13,5 @@ pub(crate) mod page;
 pub(crate) mod plant_probe;
 pub(crate) mod plant_state;
 pub(crate) mod report;
+pub mod scans_back;
 pub mod scene_export;

@@ -3,7 +3,7 @@
 
 use crate::cache::{Key, VerifiedFiles, read, written};
 use contract::{Error, Fit, Floor, Input, Kind, Mask, Result, Scan};
-use export::{LasSettings, Quantum};
+use export::{LasSettings, Quantum, RawVlr};
 use geometry::Pose;
 use ingest::Before;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file.
 const NAME: &str = "plant.bin";
 /// First bytes of the file: name and version of its format.
-pub(super) const FORMAT: &[u8] = b"stillpoint.plant/6\n";
+pub(super) const FORMAT: &[u8] = b"stillpoint.plant/7\n";
 
 /// Scans, floor and robots of a plant as a run has found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -36,7 +36,7 @@ pub(crate) struct PlantState {
 }
 
 /// Layout of the records of clouds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Records {
     scale: [f64; 3],
     offset: [f64; 3],
@@ -45,6 +45,8 @@ pub(crate) struct Records {
     compress: bool,
     /// Edge of the spatial tiles, metres; `None` without tiles.
     tile_edge: Option<f64>,
+    /// Records of the reference system.
+    system: Vec<RawVlr>,
 }
 
 impl Records {
@@ -56,6 +58,7 @@ impl Records {
             with_bodies: export.bodies,
             compress: export.compress,
             tile_edge: export.tiles.then_some(export.tile_edge),
+            system: las.vlrs.clone(),
         }
     }
 
@@ -65,6 +68,7 @@ impl Records {
             with_color: self.with_color,
             with_bodies: self.with_bodies,
             compress: self.compress,
+            vlrs: self.system.clone(),
             ..LasSettings::new(quantum)
         }
     }

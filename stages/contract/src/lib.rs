@@ -25,6 +25,7 @@ pub mod fence;
 mod fit;
 mod label;
 mod lattice;
+mod ptx;
 pub mod quote;
 mod residual;
 mod scan;
@@ -46,6 +47,7 @@ pub use fit::{
 };
 pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};
+pub use ptx::is_ptx_no_return;
 pub use residual::{LinkAt, PlaceRun, RESIDUAL_EDGE, ResidualVoxel, TileLabels};
 pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId};
 pub use space::{Space, SpaceGrid, SpaceKind};

@@ -160,7 +160,7 @@ pub(crate) fn head(settings: &LasSettings, extent: &RecordExtent) -> Result<Vec<
     let mut by_return = [0; 15];
     by_return[0] = extent.n;
     let header = raw::Header {
-        global_encoding: if settings.short { 0 } else { WKT }
+        global_encoding: if settings.short || settings.has_geotiff() { 0 } else { WKT }
             | if settings.standard_gps_time { STANDARD_TIME } else { 0 },
         version,
         system_identifier: text("EXTRACTION"),

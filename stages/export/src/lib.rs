@@ -79,7 +79,7 @@ pub use places::NamedMap;
 pub use plan_picture::PlanPicture;
 pub use ply::{PLY, write_ply};
 pub use posture::JointWords;
-pub use record::{LasSettings, Quantum, RawVlr, class_of};
+pub use record::{LasSettings, PROJECTION, Quantum, RawVlr, class_of};
 pub use refill::{OldPoint, StatedTile, read_tile};
 pub use result::{
     BasePose, BaseSigma, InputEntry, LabelFiles, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,

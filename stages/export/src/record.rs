@@ -2,6 +2,7 @@
 
 use contract::{Error, Kind, PointKind};
 use geometry::Aabb;
+use serde::{Deserialize, Serialize};
 
 /// Kind, LAS class (2 is the standard's ground, 64 and up are user-defined) and name.
 pub(crate) const CLASSES: [(PointKind, u8, &str); 5] = [
@@ -81,7 +82,7 @@ const MOST_STEPS: f64 = i32::MAX as f64;
 const STEPS: [f64; 12] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2];
 
 /// A variable length record that is copied, such as the reference system of an input.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RawVlr {
     /// Organisation that defined it.
     pub user_id: String,
@@ -92,6 +93,12 @@ pub struct RawVlr {
     /// Its content.
     pub data: Vec<u8>,
 }
+
+/// Organisation that defines the records of reference systems, and numbers of the records of
+/// GeoTIFF keys and well-known text.
+pub const PROJECTION: &str = "LASF_Projection";
+const GEOTIFF: u16 = 34_735;
+const WELL_KNOWN_TEXT: u16 = 2112;
 
 /// The format of a LAS file.
 #[derive(Debug, Clone, PartialEq)]
@@ -129,6 +136,14 @@ impl LasSettings {
             standard_gps_time: false,
             vlrs: Vec::new(),
         }
+    }
+
+    /// Whether the reference system is stated as GeoTIFF keys and not as well-known text. The
+    /// format asks for text with records of format 6 and up, but only its source could translate
+    /// the keys; readers follow the bit of the header.
+    pub(crate) fn has_geotiff(&self) -> bool {
+        let has = |id: u16| self.vlrs.iter().any(|v| v.user_id == PROJECTION && v.record_id == id);
+        has(GEOTIFF) && !has(WELL_KNOWN_TEXT)
     }
 
     /// LAS point format.

@@ -244,3 +244,35 @@ fn a_tile_that_states_more_than_fits_takes_no_memory_for_it() {
     std::fs::write(&path, &bytes).expect("writes");
     assert_eq!(n_read(&path).expect("there is nothing to read"), 0);
 }
+
+#[test]
+fn a_reference_system_comes_back_by_the_reader_of_las() {
+    let quantum = Quantum { scale: [1e-4; 3], offset: [0.0; 3] };
+    let record = |record_id: u16| export::RawVlr {
+        user_id: export::PROJECTION.into(),
+        record_id,
+        description: String::new(),
+        data: vec![record_id as u8; 20],
+    };
+    for (ids, is_text) in [(vec![2112], true), (vec![34_735, 34_736], false), (vec![], true)] {
+        let path = folder("system").join(format!("{}.las", ids.len()));
+        let vlrs = ids.iter().copied().map(record).collect();
+        let settings = LasSettings { vlrs, ..LasSettings::new(quantum) };
+        let mut writer = LasWriter::create(&path, settings.clone()).expect("create");
+        let points = PointColumns {
+            world: &[[1.0, 2.0, 3.0]],
+            labels: &[Label::FIXED],
+            ..PointColumns::default()
+        };
+        writer.push(&points).expect("push");
+        writer.finish().expect("finish");
+        let reader = las::Reader::from_path(&path).expect("a LAS file");
+        let vlrs = reader.header().vlrs();
+        let found: Vec<u16> =
+            vlrs.iter().filter(|v| v.user_id == "LASF_Projection").map(|v| v.record_id).collect();
+        // The crate takes the bit for set wherever the format asks for text.
+        let bit = std::fs::read(&path).expect("bytes")[6] & 16;
+        assert_eq!((found, bit == 16), (ids, is_text));
+        export::read_tile(&path, &settings, None, |_| Ok(())).expect("reads");
+    }
+}

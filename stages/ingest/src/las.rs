@@ -12,7 +12,7 @@ use crate::reader::{
     Extent, FileReading, MaskSeed, RawStrip, Reader, SampledPoint, ScanSeed, Want,
 };
 use crate::settings::Settings;
-use crate::units::Units;
+use crate::units::{ReferenceSystem, Units};
 use contract::{Error, Format, Result};
 use std::path::Path;
 
@@ -69,6 +69,10 @@ impl Reader for Las {
     fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {
         let header = &self.records.header;
         Some((header.scale, header.offset))
+    }
+
+    fn system(&self) -> Option<&ReferenceSystem> {
+        self.records.header.system.as_ref()
     }
 
     fn masks(&self) -> &[MaskSeed] {

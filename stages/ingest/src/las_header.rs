@@ -1,7 +1,7 @@
 //! Reads the header of a LAS or LAZ file and checks it against the length of the file.
 
 use crate::las_layout::RecordLayout;
-use crate::units::{self, Declaration};
+use crate::units::{self, Declaration, ReferenceSystem};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::io::Cursor;
@@ -35,6 +35,8 @@ pub(crate) struct LasHeader {
     pub(crate) software: String,
     /// Declarations of units in its records, the decisive one first.
     pub(crate) declared: Vec<Declaration>,
+    /// The coordinate reference system, as its records state it.
+    pub(crate) system: Option<ReferenceSystem>,
     /// Messages about oddities.
     pub(crate) notes: Vec<String>,
 }
@@ -87,6 +89,7 @@ impl LasHeader {
             copc: false,
             software: text(&raw.generating_software),
             declared: units::of_las(&raw, data),
+            system: units::system_of_las(&raw, data),
             notes: Vec::new(),
         };
         header.check_numbers()?;

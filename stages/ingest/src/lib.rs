@@ -72,4 +72,4 @@ pub use regular::{read_text, regular};
 pub use scanners::{KnownScanner, KnownScanners};
 pub use settings::Settings;
 pub use sources::{Before, InputPiece, InputPieces, Sources, Strips, open, open_after};
-pub use units::{LengthUnit, Origin, Units};
+pub use units::{LengthUnit, Origin, ReferenceSystem, Units};

@@ -3,7 +3,7 @@
 
 use crate::map::Mapped;
 use crate::oddities::Oddities;
-use crate::units::Units;
+use crate::units::{ReferenceSystem, Units};
 use contract::{Attributes, Error, Format, Kind, Result};
 use geometry::{Aabb, Pose};
 use std::ops::Range;
@@ -163,6 +163,10 @@ pub(crate) trait Reader: Send + Sync {
     fn has_color(&self) -> bool;
     /// Scale and offset of the coordinates, metres, where they are multiples of a step (LAS).
     fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {
+        None
+    }
+    /// The coordinate reference system that the file states (LAS).
+    fn system(&self) -> Option<&ReferenceSystem> {
         None
     }
     /// Counts of odd points of a scan from the last full read, where they are counted.

@@ -11,7 +11,7 @@ use crate::reader::{self, Extent, FileReading, Reader, Want};
 use crate::regular::regular;
 use crate::scanners::KnownScanners;
 use crate::settings::Settings;
-use crate::units::{Choice, Units};
+use crate::units::{Choice, ReferenceSystem, Units};
 use contract::{
     Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
 };
@@ -199,6 +199,17 @@ impl Sources {
         let is_mixed = all.clone().any(|quantum| quantum.is_none());
         let finest = all.flatten().min_by(|a, b| coarsest(a).total_cmp(&coarsest(b)));
         finest.filter(|quantum| !is_mixed || coarsest(quantum) <= OTHERS)
+    }
+
+    /// The coordinate reference system of all LAS inputs, for clouds in metres; `None` where they
+    /// state none, different ones, or one in another unit.
+    #[must_use]
+    pub fn system(&self) -> Option<&ReferenceSystem> {
+        let all = self.files.iter().map(|file| &file.reader);
+        let mut stated = all.clone().filter_map(|reader| reader.system());
+        let first = stated.next()?;
+        let is_one = stated.all(|other| other == first);
+        (is_one && all.into_iter().all(|reader| reader.units().is_metres())).then_some(first)
     }
 
     /// Whether any input has colour.

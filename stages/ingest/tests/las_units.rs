@@ -88,3 +88,33 @@ fn real_files_are_read_in_the_units_that_they_declare() {
         assert!(open(name, "m").is_ok(), "{name}");
     }
 }
+
+/// File, and numbers and lengths of the records of its reference system; none where its unit is no
+/// metre.
+const SYSTEMS: &[(&str, &[(u16, usize)])] = &[
+    // It has GeoTIFF keys, too, but its header says that the text counts.
+    ("lpy__append-bug.laz", &[(2112, 1026)]),
+    ("lpy__fullwave.laz", &[(2112, 1965)]),
+    ("lpy__plane.laz", &[(34_735, 192), (34_736, 96), (34_737, 95)]),
+    ("pdal__1.0_0.las", &[(34_735, 64), (34_737, 27)]),
+    ("pdal__1.2-empty-geotiff-vlrs.las", &[(34_735, 56)]),
+    ("lpy__simple.copc.laz", &[]),
+    ("lpy__test1_4.las", &[]),
+    ("pas__10_points_format_6.las", &[]),
+];
+
+#[test]
+fn reference_systems_in_metres_are_handed_on() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scans/las-compat");
+    if !folder.is_dir() {
+        eprintln!("skipped: no folder of compatibility files");
+        return;
+    }
+    for (name, records) in SYSTEMS {
+        let sources = open(&[folder.join(name)], None, &Settings::default(), &OneByOne).unwrap();
+        let system = sources.system().map_or(&[][..], |system| &system.records);
+        let lengths: Vec<(u16, usize)> =
+            system.iter().map(|(id, data)| (*id, data.len())).collect();
+        assert_eq!(&lengths, records, "{name}");
+    }
+}

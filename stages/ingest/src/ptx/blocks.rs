@@ -5,7 +5,7 @@ use super::look::PtxLook;
 use crate::frame::{self, FileFrame};
 use crate::oddities::no_returns_note;
 use crate::text::{TextLines, numbers};
-use contract::{Error, Result};
+use contract::{Error, Result, is_ptx_no_return};
 use geometry::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
@@ -67,7 +67,7 @@ fn block(lines: &mut TextLines, n_bytes: u64, metres: f64) -> Result<(PtxScan, V
         if n == 0 {
             n_columns = columns(lines)?;
         }
-        if is_no_return(lines.line()) {
+        if is_ptx_no_return(lines.line()) {
             continue;
         }
         look.add(n_valid, lines.line(), n_columns);
@@ -202,30 +202,4 @@ fn columns(lines: &TextLines) -> Result<usize> {
             .error(format!("not a number, \"{word}\""))
             .hint("numbers need a decimal point, not a comma")),
     }
-}
-
-/// Whether a line is `0 0 0 …`, which in PTX marks a beam without return.
-pub(super) fn is_no_return(line: &[u8]) -> bool {
-    let mut n_zeros = 0;
-    let mut within = false;
-    let mut digits = 0;
-    for byte in line {
-        match byte {
-            b'0' => (within, digits) = (true, digits + 1),
-            b'.' | b'-' | b'+' => within = true,
-            b' ' | b'\t' | b'\r' if within => {
-                if digits == 0 {
-                    return false;
-                }
-                (n_zeros, within, digits) = (n_zeros + 1, false, 0);
-                if n_zeros == 3 {
-                    return true;
-                }
-            }
-            b' ' | b'\t' => {}
-            // `0e0` is zero, too, but no program writes it, so it counts as a point at the scanner.
-            _ => return false,
-        }
-    }
-    n_zeros == 2 && digits > 0
 }

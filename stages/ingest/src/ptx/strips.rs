@@ -1,11 +1,10 @@
 //! Strips of a PTX file in file order, from the lines of all its blocks.
 
-use super::blocks;
 use super::file::{PtxFile, PtxScan};
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, SampledPoint, Want};
 use crate::text::{TextLines, numbers};
-use contract::{Attributes, Result};
+use contract::{Attributes, Result, is_ptx_no_return};
 use geometry::Point;
 
 /// Number of lines over which a sample is spread: half a second of parsing.
@@ -45,7 +44,7 @@ impl<'a> PtxPoints<'a> {
                 return Err(self.lines.error("file became shorter while it was read"));
             }
             self.n_read += 1;
-            if blocks::is_no_return(self.lines.line()) {
+            if is_ptx_no_return(self.lines.line()) {
                 continue;
             }
             let n = numbers(self.lines.line(), &mut self.values[..n_wanted]).map_err(|word| {

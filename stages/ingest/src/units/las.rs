@@ -5,7 +5,7 @@ use super::{geokeys, projjson, wkt};
 use las::raw;
 
 /// Bit of the global encoding that says that the WKT record counts and not the GeoTIFF keys.
-const WKT_COUNTS: u16 = 1 << 4;
+pub(super) const WKT_COUNTS: u16 = 1 << 4;
 /// Length of the header of a variable length record, bytes.
 const HEADER: usize = 54;
 /// Length of the header of an extended variable length record, bytes.
@@ -15,14 +15,16 @@ const MAX_BYTES: usize = 1 << 20;
 /// Largest number of records that are read; writers use a handful.
 const MAX_RECORDS: usize = 4096;
 
+/// Organisations that define the records of reference systems.
+pub(super) const PROJECTION: &[&str] = &["LASF_Projection", "liblas"];
+
 /// All declarations of a file, the decisive one first.
 pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
-    let records = records(raw, data);
+    let records = vlrs(raw, data);
     let find = |users: &[&str], id: u16| {
         let is_it = |r: &&VlrRecord<'_>| r.id == id && users.contains(&r.user.as_str());
         records.iter().find(is_it).map(|r| r.payload)
     };
-    const PROJECTION: &[&str] = &["LASF_Projection", "liblas"];
     let of_wkt = |id| find(PROJECTION, id).and_then(wkt::read);
     let keys = find(PROJECTION, 34_735);
     let doubles = find(PROJECTION, 34_736).unwrap_or_default();
@@ -37,14 +39,15 @@ pub(crate) fn read(raw: &raw::Header, data: &[u8]) -> Vec<Declaration> {
     all
 }
 
-struct VlrRecord<'a> {
-    user: String,
-    id: u16,
-    payload: &'a [u8],
+/// A variable length record.
+pub(super) struct VlrRecord<'a> {
+    pub(super) user: String,
+    pub(super) id: u16,
+    pub(super) payload: &'a [u8],
 }
 
 /// The records before the points, then those after them, as far as they lie within the file.
-fn records<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<VlrRecord<'a>> {
+pub(super) fn vlrs<'a>(raw: &raw::Header, data: &'a [u8]) -> Vec<VlrRecord<'a>> {
     let mut out = Vec::new();
     let n = raw.number_of_variable_length_records as usize;
     walk(data, usize::from(raw.header_size), n, HEADER, &mut out);

@@ -8,6 +8,7 @@ mod known;
 mod las;
 mod length_unit;
 mod projjson;
+mod system;
 mod wkt;
 
 #[cfg(test)]
@@ -17,6 +18,8 @@ pub(crate) use choice::{Choice, DECLARED};
 pub(crate) use declared::Declaration;
 pub(crate) use las::read as of_las;
 pub use length_unit::LengthUnit;
+pub use system::ReferenceSystem;
+pub(crate) use system::read as system_of_las;
 pub(crate) use wkt::read as of_wkt;
 
 use contract::{Error, Kind, Result, quote};
