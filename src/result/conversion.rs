@@ -39,6 +39,8 @@ pub enum ExportFormat {
     /// Distances of voxels around each robot from what stands still, as NumPy arrays (cuRobo,
     /// nvblox)
     Distance,
+    /// The fixed world as collision mesh, which no fixed point leaves by more than a bound
+    Mesh,
 }
 
 impl ExportFormat {
@@ -46,7 +48,7 @@ impl ExportFormat {
     #[must_use]
     pub fn scene(self) -> Option<SceneFormat> {
         match self {
-            Self::Copc | Self::Ply | Self::Distance => None,
+            Self::Copc | Self::Ply | Self::Distance | Self::Mesh => None,
             Self::Urdf => Some(SceneFormat::Urdf),
             Self::Srdf => Some(SceneFormat::Srdf),
             Self::Moveit => Some(SceneFormat::Moveit),
