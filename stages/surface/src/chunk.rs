@@ -3,9 +3,10 @@
 
 use crate::voxels::{CHUNK, ChunkAt, MARGIN, VoxelLattice, VoxelPoints, WIDE, read_voxels};
 
-/// Half the thickness of the shell of a plane, in edges of a voxel: enough for its two sides not to
-/// cross by rounding.
-const HALF_THICKNESS: f64 = 0.05;
+/// Half the thickness of the shell, in edges of a voxel. That of a plane is enough for its two sides
+/// not to cross by rounding. Wires and edges of sheets have points on all sides of the mean, and a
+/// tube must outlast the reduction.
+const HALF_THICKNESS: [f64; 2] = [0.05, 0.125];
 /// Steps to the next voxel along x, y and z, by index.
 pub(crate) const STEP: [usize; 3] = [WIDE * WIDE, WIDE, 1];
 
@@ -18,8 +19,8 @@ pub struct ChunkVoxels {
     middles: Vec<[f32; 3]>,
     /// The points of each voxel that has some, by ascending index.
     measured: Vec<(u32, VoxelPoints)>,
-    /// Half the thickness of the shell of a plane, in edges.
-    pub(crate) half_thickness: f64,
+    /// Half the thickness of the shell, in edges: of planes, and of wires and edges of sheets.
+    pub(crate) half_thickness: [f64; 2],
 }
 
 /// Bits with the number of those that are set before each.
@@ -71,10 +72,10 @@ impl ChunkVoxels {
     /// The voxels of a chunk as cubes, each with one point in its middle.
     #[must_use]
     pub fn cubes(lattice: VoxelLattice, at: ChunkAt, bytes: &[u8]) -> Self {
-        Self::read(lattice, at, bytes, 0.5)
+        Self::read(lattice, at, bytes, [0.5; 2])
     }
 
-    fn read(lattice: VoxelLattice, at: ChunkAt, bytes: &[u8], half_thickness: f64) -> Self {
+    fn read(lattice: VoxelLattice, at: ChunkAt, bytes: &[u8], half_thickness: [f64; 2]) -> Self {
         let measured = read_voxels(bytes);
         let bits = RankedBits::new(measured.iter().map(|(at, _)| *at as usize));
         let middles = measured.iter().map(|(_, points)| points.middle()).collect();

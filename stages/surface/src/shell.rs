@@ -11,9 +11,6 @@ use crate::mesh::{SeamId, SurfaceMesh};
 use crate::voxels::{CHUNK, WIDE};
 use rustc_hash::FxHashMap;
 
-/// How much thicker the shell of wires and of edges of sheets is than that of planes: their points
-/// lie on all sides of the mean, and a tube must outlast the reduction.
-const RIM: f64 = 2.5;
 /// Distance from free voxels that corners keep, metres.
 const APART: f64 = 1e-4;
 
@@ -131,7 +128,8 @@ impl Net<'_> {
                 nearest = (apart, own);
             }
         }
-        let thickness = 2.0 * self.chunk.half_thickness * if n < 3.0 { RIM } else { 1.0 };
+        // A corner of a plane has four voxels of it, one at its edge or on a wire one or two.
+        let thickness = 2.0 * self.chunk.half_thickness[usize::from(n < 3.0)];
         let drawn: [f64; 3] = std::array::from_fn(|i| {
             let outwards = corner_at[i] - middle[i] / n;
             mean[i] / n + outwards * thickness
@@ -186,6 +184,23 @@ mod tests {
         for v in &mesh.vertices {
             let off = v[2] - (0.5 + 0.0003 / 0.004 * (v[0] - 0.5));
             assert!(off.abs() < 0.0015, "{v:?}: {off}");
+        }
+    }
+
+    #[test]
+    fn cubes_stand_where_their_voxels_do() {
+        let lattice = VoxelLattice { origin: [0.0; 3], edge: 0.05 };
+        let mut voxels = OccupiedVoxels::new(lattice);
+        for p in [[0.125, 0.125, 0.125], [0.175, 0.125, 0.125]] {
+            voxels.add(p).expect("near");
+        }
+        let chunk = ChunkVoxels::cubes(lattice, [0; 3], &voxels.into_chunks()[&[0; 3]]);
+        let mesh = shell(&chunk, &FreeSpace::default());
+        let bounds = geometry::Aabb::of(mesh.vertices.iter().copied());
+        let wanted = [[0.1, 0.1, 0.1], [0.2, 0.15, 0.15]];
+        for (found, wanted) in [bounds.min, bounds.max].iter().zip(wanted) {
+            let is_there = found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-4);
+            assert!(is_there, "{found:?}, not {wanted:?}");
         }
     }
 
