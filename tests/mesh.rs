@@ -75,7 +75,7 @@ fn what_points_block_the_mesh_blocks() {
     let names: Vec<&str> = joints.keys().map(String::as_str).collect();
     let found: Vec<f64> = joints.values().map(|v| v.as_f64().expect("a value")).collect();
     let mut down = found.clone();
-    down[1] += 1.2;
+    (down[1], down[2]) = (1.2, 1.2);
     let line =
         |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
     let path = names.join(",") + "\n" + &line(&found) + &line(&down);
@@ -85,13 +85,14 @@ fn what_points_block_the_mesh_blocks() {
     let surface = of_ply(&bytes);
     let mut n = 0;
     for contact in checked["contacts"].as_array().expect("contacts") {
-        if !["fixed", "floor"].iter().any(|what| contact["what"] == *what) {
+        let is_solid = ["fixed", "floor"].iter().any(|what| contact["what"] == *what);
+        if !is_solid || !["hit", "inside"].iter().any(|level| contact["level"] == *level) {
             continue;
         }
         let at = contact["at"].as_array().expect("a place");
         let at: [f64; 3] = std::array::from_fn(|i| at[i].as_f64().expect("metres"));
-        // The bound, and half of the cell by which `check` knows a point.
-        let reach = 0.01 + 0.01;
+        // The bound, and the cell by which `check` knows a point.
+        let reach = 0.01 + clearance::CELL;
         let bounds = geometry::Aabb { min: at, max: at };
         let far = TriangleGrid::new(&surface, &bounds, reach).square(at, 0.0).sqrt();
         assert!(f64::from(far) <= reach, "{far} m from the mesh: {contact}");
