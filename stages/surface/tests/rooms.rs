@@ -40,8 +40,9 @@ fn room() -> Vec<[f64; 3]> {
     points
 }
 
-/// The mesh of points that come in so many tiles, and how many boxes it took.
-fn meshed(points: &[[f64; 3]], n_tiles: usize) -> Result<(SurfaceMesh, usize)> {
+/// The mesh of points that come in so many tiles, how many triangles it was made of, and how many
+/// boxes it took.
+fn meshed(points: &[[f64; 3]], n_tiles: usize) -> Result<(SurfaceMesh, [usize; 2])> {
     let lattice = VoxelLattice { origin: [0.0; 3], edge: EDGE_PER_BOUND * BOUND };
     let mut chunks: BTreeMap<ChunkAt, Vec<u8>> = BTreeMap::new();
     // The last tile comes first, as when another thread is faster.
@@ -57,27 +58,30 @@ fn meshed(points: &[[f64; 3]], n_tiles: usize) -> Result<(SurfaceMesh, usize)> {
     let error = ERROR_PER_BOUND * BOUND;
     let part = |(at, bytes): (ChunkAt, Vec<u8>)| {
         let chunk = ChunkVoxels::new(lattice, at, &bytes);
-        chunk_surface(&chunk, &FreeSpace::default(), error).map(|part| part.mesh)
+        chunk_surface(&chunk, &FreeSpace::default(), error)
     };
     let parts = chunks.into_iter().map(part).collect::<Result<Vec<_>>>()?;
     assert!(parts.len() > 1, "the room has seams");
+    let n_fine = parts.iter().map(|part| part.n_fine).sum();
+    let parts = parts.into_iter().map(|part| part.mesh).collect();
     let mut mesh = join_surfaces(parts, error)?;
     let grid = TriangleGrid::new(&mesh, &Aabb::of(points.iter().copied()), BOUND);
     let mut far = FarPoints::new(lattice, BOUND);
     let is_far = |p: &&[f64; 3]| grid.square(**p, 0.0) > (BOUND * BOUND) as f32;
     points.iter().filter(is_far).for_each(|p| far.add(*p));
     let (n_boxes, _) = far.append_to(&mut mesh);
-    Ok((mesh, n_boxes))
+    Ok((mesh, [n_fine, n_boxes]))
 }
 
 #[test]
 fn no_point_is_beyond_the_bound_and_few_triangles_do_it() -> Result<()> {
     let points = room();
-    let (mesh, n_boxes) = meshed(&points, 1)?;
+    let (mesh, [n_fine, n_boxes]) = meshed(&points, 1)?;
     let grid = TriangleGrid::new(&mesh, &Aabb::of(points.iter().copied()), BOUND);
     let most = (BOUND * BOUND * 1.001) as f32;
     assert!(points.iter().all(|p| grid.square(*p, 0.0) <= most));
-    assert!(mesh.triangles.len() < 12_000, "{} triangles", mesh.triangles.len());
+    let n = mesh.triangles.len();
+    assert!(10 * n < n_fine, "{n} of {n_fine} triangles");
     assert!(n_boxes < 400, "{n_boxes} boxes");
     // Nor does the mesh stand out: each vertex is near points.
     let all = points.iter().map(|p| p.map(|v| (v / 0.03).floor() as i64));
