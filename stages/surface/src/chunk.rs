@@ -3,9 +3,9 @@
 
 use crate::voxels::{CHUNK, ChunkAt, MARGIN, VoxelLattice, VoxelPoints, WIDE, read_voxels};
 
-/// Half the thickness of the shell, in edges of a voxel. That of a plane is enough for its two sides
-/// not to cross by rounding. Wires and edges of sheets have points on all sides of the mean, and a
-/// tube must outlast the reduction.
+/// Half the thickness of the shell, in edges of a voxel. That of a plane is enough for its two
+/// sides not to cross by rounding. Wires and edges of sheets have points on all sides of the
+/// mean, and a tube must outlast the reduction.
 const HALF_THICKNESS: [f64; 2] = [0.05, 0.125];
 /// Steps to the next voxel along x, y and z, by index.
 pub(crate) const STEP: [usize; 3] = [WIDE * WIDE, WIDE, 1];
