@@ -62,6 +62,8 @@ fn usage_is_two() {
         &["check", "a", "--trajectory", "b", "--margin", "7"],
         &["rescan", "a.e57", "--base", "b", "--out", "o", "--cell", "1,2", "--robot", "R1"],
         &["export", "a", "--to", "ply", "--robots", "b"],
+        &["export", "a", "--to", "ply", "--bound", "0.01"],
+        &["export", "a", "--to", "mesh", "--bound", "5"],
         &["export", "a", "--to", "mjcf", "--package", "cell"],
         &["export", "a", "--to", "urdf", "--package", "../cell"],
     ] {
@@ -105,6 +107,7 @@ fn a_path_that_leads_nowhere_is_four_for_every_command() {
         (&["export", &nosuch, "--to", "mjcf"], &nosuch),
         (&["export", &empty, "--to", "urdf"], &empty),
         (&["export", &empty, "--to", "distance"], &empty),
+        (&["export", &empty, "--to", "mesh"], &empty),
         (&["check", &nosuch, "--trajectory", &path], &nosuch),
         (&["check", &empty, "--trajectory", &path], &empty),
         (&["check", &empty, "--trajectory", &nosuch], &nosuch),

@@ -8,6 +8,7 @@ use crate::engine::Engine;
 use crate::engine::progress::{Mode, Progress};
 use crate::job::{FlagValues, Means};
 use crate::result::conversion::ExportFormat;
+use crate::result::mesh_export::MeshFormat;
 use clap::{Args, Parser, Subcommand};
 use contract::Result;
 use std::path::PathBuf;
@@ -197,6 +198,29 @@ pub(super) struct ExportFlags {
     /// Write no classes, robots and links, for e57: for readers that refuse extensions
     #[arg(long)]
     pub(super) without_labels: bool,
+    #[command(flatten)]
+    pub(super) mesh: MeshFlags,
+}
+
+/// Flags of collision meshes.
+#[derive(Debug, Args)]
+pub(super) struct MeshFlags {
+    /// Mesh: greatest distance of a fixed point from it, metres (default: 0.01)
+    #[arg(long, value_name = "METRES")]
+    pub(super) bound: Option<f64>,
+    /// Mesh: most triangles; where the bound takes more, the finest coarser bound is taken that
+    /// does not, and stated
+    #[arg(long, value_name = "N")]
+    pub(super) triangles: Option<usize>,
+    /// Mesh: format of the file (default: stl)
+    #[arg(long, value_name = "FORMAT", value_enum)]
+    pub(super) mesh_format: Option<MeshFormat>,
+    /// Mesh: only the known space around this robot
+    #[arg(long, value_name = "ID")]
+    pub(super) robot: Option<String>,
+    /// Mesh: also the space around robots that no beam passed through, as a closed mesh
+    #[arg(long)]
+    pub(super) unknown: bool,
 }
 
 #[derive(Debug, Args)]

@@ -3,7 +3,7 @@
 
 use super::exit;
 use super::flags::{
-    CheckFlags, Common, DiffFlags, ExportFlags, HistoryFlags, OutFlags, ReportFlags,
+    CheckFlags, Common, DiffFlags, ExportFlags, HistoryFlags, MeshFlags, OutFlags, ReportFlags,
 };
 use super::say::Say;
 use crate::cache::{Manifest, VerifiedFiles, result_of};
@@ -11,8 +11,10 @@ use crate::check::{CheckRequest, PathOutcome as Clear};
 use crate::job::Outcome;
 use crate::result::changed_things::ThingEntry;
 use crate::result::changes::{changes, words};
-use crate::result::conversion::convert;
+use crate::result::conversion::{ExportFormat, convert};
 use crate::result::history;
+use crate::result::mesh_build::BOUNDS;
+use crate::result::mesh_export::{MeshFormat, MeshRequest, export_mesh};
 use crate::result::page::{page_data, write_page};
 use crate::result::scans_back::{ScansBack, give_scans_back};
 use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
@@ -80,8 +82,9 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
         };
         let (written, notes) = give_scans_back(&request, &means, &engine)?;
         notes.iter().for_each(|note| engine.progress.say(note));
-        return Ok(say_paths(&written, say));
+        return Ok(say_paths(&written, "", say));
     }
+    let mut words = String::new();
     let written = match scene {
         Some(format) => {
             let request = SceneRequest {
@@ -94,18 +97,53 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
             notes.iter().for_each(|note| say.warning(note));
             written
         }
+        None if flags.to == ExportFormat::Mesh => {
+            let mesh = export_mesh(&mesh_request(flags)?, &engine)?;
+            mesh.warnings.iter().for_each(|warning| say.warning(warning));
+            words = mesh.words;
+            mesh.paths
+        }
         None => convert(&flags.out, flags.to, &engine)?,
     };
-    Ok(say_paths(&written, say))
+    Ok(say_paths(&written, &words, say))
 }
 
-fn say_paths(written: &[PathBuf], say: &Say) -> u8 {
-    let names: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
-    say.result(&names.join("\n"));
+/// Says which files were written, with a word on what is in them.
+fn say_paths(written: &[PathBuf], words: &str, say: &Say) -> u8 {
+    let names = written.iter().map(|path| path.display().to_string());
+    let lines: Vec<String> = names.chain((!words.is_empty()).then(|| words.to_owned())).collect();
+    say.result(&lines.join("\n"));
     exit::OK
 }
 
-/// Refuses flags of other formats than the one that is written, and names that no ROS package has.
+/// The mesh that flags ask for.
+fn mesh_request(flags: &ExportFlags) -> Result<MeshRequest> {
+    let MeshFlags { bound, triangles, mesh_format, robot, unknown } = &flags.mesh;
+    let bound = bound.unwrap_or(BOUND);
+    let [low, high] = BOUNDS;
+    if !(low..=high).contains(&bound) {
+        let what = format!("a bound of {bound} m is not possible");
+        return Err(Error::new(Kind::Usage, what).hint(format!("give metres, {low} to {high}")));
+    }
+    if *triangles == Some(0) {
+        let what = "a mesh of no triangles covers nothing";
+        return Err(Error::new(Kind::Usage, what).hint("give a number from 1 on"));
+    }
+    Ok(MeshRequest {
+        out: flags.out.clone(),
+        bound,
+        triangles: *triangles,
+        format: mesh_format.unwrap_or(MeshFormat::Stl),
+        robot: robot.clone(),
+        with_unknown: *unknown,
+    })
+}
+
+/// Bound of a mesh where none is given, metres: about the noise of a scan and its registration.
+const BOUND: f64 = 0.01;
+
+/// Refuses flags of scenes and meshes where none of them is written, and names that no ROS package
+/// has.
 fn flags_fit(flags: &ExportFlags, scene: Option<SceneFormat>) -> Result<()> {
     let usage = |what: String, hint: &str| Err(Error::new(Kind::Usage, what).hint(hint));
     let scans = flags.to.scans();
@@ -121,6 +159,12 @@ fn flags_fit(flags: &ExportFlags, scene: Option<SceneFormat>) -> Result<()> {
     }
     if scene.is_none() && flags.robots.is_some() {
         return usage("--robots is for scenes".into(), "leave it out for this format");
+    }
+    let MeshFlags { bound, triangles, mesh_format, robot, unknown } = &flags.mesh;
+    let has_any = bound.is_some() || triangles.is_some() || mesh_format.is_some();
+    if flags.to != ExportFormat::Mesh && (has_any || robot.is_some() || *unknown) {
+        let what = "--bound, --triangles, --mesh-format, --robot and --unknown are for meshes";
+        return usage(what.into(), "leave them out for this format, or give --to mesh");
     }
     let Some(name) = &flags.package else { return Ok(()) };
     if !scene.is_some_and(SceneFormat::has_urdfs) {

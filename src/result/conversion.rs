@@ -44,6 +44,8 @@ pub enum ExportFormat {
     E57,
     /// Each PTX input as it was, with moving points as beams without return
     Ptx,
+    /// The fixed world as collision mesh, which no fixed point leaves by more than a bound
+    Mesh,
 }
 
 impl ExportFormat {
@@ -61,7 +63,7 @@ impl ExportFormat {
     #[must_use]
     pub fn scene(self) -> Option<SceneFormat> {
         match self {
-            Self::Copc | Self::Ply | Self::Distance | Self::E57 | Self::Ptx => None,
+            Self::Copc | Self::Ply | Self::Distance | Self::E57 | Self::Ptx | Self::Mesh => None,
             Self::Urdf => Some(SceneFormat::Urdf),
             Self::Srdf => Some(SceneFormat::Srdf),
             Self::Moveit => Some(SceneFormat::Moveit),

@@ -1,5 +1,5 @@
 //! Results as files and words: `result.json` and the summary, the state for later sessions, changes
-//! between results, their history, their conversion and their page.
+//! between results, their history, their conversion, their meshes and their page.
 
 pub(crate) mod advice;
 pub(crate) mod changed_things;
@@ -8,6 +8,9 @@ pub mod conversion;
 pub(crate) mod copc;
 pub mod distance_export;
 pub mod history;
+pub(crate) mod mesh_build;
+mod mesh_chunks;
+pub mod mesh_export;
 pub(crate) mod page;
 #[cfg(fuzzing)]
 pub(crate) mod plant_probe;

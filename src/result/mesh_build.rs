@@ -1,0 +1,277 @@
+//! Makes the mesh of a published result: tiles into voxels, chunks into surfaces, which are joined
+//! and measured against all points.
+
+use super::mesh_chunks::VoxelScratch;
+use super::plant_state::PlantState;
+use crate::cache::VerifiedFiles;
+use crate::engine::{Engine, Task};
+use contract::{PointKind, Result, Space, SpaceKind};
+use export::read_tile;
+use geometry::Aabb;
+use std::path::PathBuf;
+use surface::{
+    ChunkVoxels, EDGE_PER_BOUND, ERROR_PER_BOUND, FarPoints, FreeSpace, OccupiedVoxels,
+    SurfaceMesh, TriangleGrid, VoxelLattice, chunk_surface, join_surfaces,
+};
+
+/// Bounds that a mesh may have, metres.
+pub(crate) const BOUNDS: [f64; 2] = [0.002, 0.5];
+
+/// Number of bounds that are tried to keep to a number of triangles.
+const TRIES: usize = 8;
+/// Smallest and largest factor from one bound to the next.
+const FACTORS: [f64; 2] = [1.15, 3.0];
+
+/// Least share of the way from one tried bound to the other that the next one keeps from both.
+const WITHIN: f64 = 0.2;
+
+/// A result of which a mesh is made.
+pub(super) struct MeshedResult<'a> {
+    pub(super) files: &'a VerifiedFiles,
+    pub(super) state: &'a PlantState,
+    pub(super) tiles: Vec<String>,
+    pub(super) region: Option<Aabb>,
+    pub(super) free: FreeSpace,
+    pub(super) scratch: PathBuf,
+    pub(super) engine: &'a Engine,
+}
+
+/// A mesh that keeps to a bound, and how it was measured.
+pub(super) struct BoundedMesh {
+    pub(super) mesh: SurfaceMesh,
+    pub(super) bound: f64,
+    /// Distance of the farthest point, metres.
+    pub(super) farthest: f64,
+    pub(super) n_points: u64,
+    pub(super) n_moving: u64,
+    pub(super) n_fine: usize,
+    pub(super) n_boxes: usize,
+}
+
+/// Points of a tile that are read.
+struct ReadPoints {
+    n: u64,
+    n_moving: u64,
+    /// Bounds of those that stand still.
+    bounds: Aabb,
+}
+
+impl MeshedResult<'_> {
+    /// The mesh with the requested bound, or with the finest one above it that keeps to the number
+    /// of triangles.
+    pub(super) fn within(
+        &self,
+        finest: f64,
+        triangles: Option<usize>,
+        warnings: &mut Vec<String>,
+    ) -> Result<BoundedMesh> {
+        let mut found = self.mesh(finest)?;
+        let Some(most) = triangles else { return Ok(found) };
+        // The coarsest bound that is known to be too fine, and its number of triangles.
+        let mut too_fine: Option<(f64, usize)> = None;
+        for _ in 0..TRIES {
+            let n = found.mesh.triangles.len();
+            let next = match too_fine {
+                _ if n > most => {
+                    too_fine = Some((found.bound, n));
+                    let factor = (n as f64 / most as f64).sqrt().clamp(FACTORS[0], FACTORS[1]);
+                    (found.bound * factor).min(BOUNDS[1])
+                }
+                Some((low, n_low)) if found.bound > low * FACTORS[0] => {
+                    // Between the two on a line of logarithms, but clearly within.
+                    let share = (n_low as f64 / most as f64).ln() / (n_low as f64 / n as f64).ln();
+                    low * (found.bound / low).powf(share.clamp(WITHIN, 1.0 - WITHIN))
+                }
+                _ => break,
+            };
+            if next <= found.bound && n > most {
+                break;
+            }
+            let other = self.mesh(next)?;
+            let n_other = other.mesh.triangles.len();
+            if n <= most && n_other > most {
+                too_fine = Some((next, n_other));
+            } else {
+                found = other;
+            }
+        }
+        let n = found.mesh.triangles.len();
+        if n > most {
+            warnings.push(format!("{most} triangles cannot be kept to: there are {n}"));
+        }
+        Ok(found)
+    }
+
+    /// The lattice of a bound: its origin is a whole number of metres near the tiles, so that
+    /// places keep their precision in map coordinates.
+    fn lattice(&self, bound: f64) -> VoxelLattice {
+        let origin = self.state.records.las().quantum.offset.map(f64::round);
+        VoxelLattice { origin, edge: EDGE_PER_BOUND * bound }
+    }
+
+    /// The mesh that no point leaves by more than the bound.
+    fn mesh(&self, bound: f64) -> Result<BoundedMesh> {
+        let lattice = self.lattice(bound);
+        let scratch = VoxelScratch::create(&self.scratch)?;
+        let counted = self.engine.fan_out("voxels", self.tiles.clone(), |tile| {
+            let mut voxels = OccupiedVoxels::new(lattice);
+            let mut own = ReadPoints { n: 0, n_moving: 0, bounds: Aabb::EMPTY };
+            self.each_point(&tile, |world, moves| {
+                if moves {
+                    own.n_moving += 1;
+                    return Ok(());
+                }
+                own.n += 1;
+                own.bounds.add(world);
+                voxels.add(world)
+            })?;
+            scratch.add(voxels.into_chunks())?;
+            Ok(own)
+        })?;
+        let chunks = scratch.chunks();
+        let error = ERROR_PER_BOUND * bound;
+        let parts = self.engine.fan_out(Task::new("surface").large(), chunks, |at| {
+            let chunk = ChunkVoxels::new(lattice, at, &scratch.read(at)?);
+            let found = chunk_surface(&chunk, &self.free, error)?;
+            Ok((at, found))
+        })?;
+        drop(scratch);
+        let n_fine = parts.iter().map(|(_, part)| part.n_fine).sum();
+        let parts = parts.into_iter().map(|(at, part)| (at, part.mesh)).collect();
+        let mesh = join_all(parts, error, self.engine)?;
+        let found = BoundedMesh {
+            mesh,
+            bound,
+            farthest: 0.0,
+            n_points: counted.iter().map(|own| own.n).sum(),
+            n_moving: counted.iter().map(|own| own.n_moving).sum(),
+            n_fine,
+            n_boxes: 0,
+        };
+        self.measured(found, &counted)
+    }
+
+    /// Measures all points, and puts boxes around those beyond the bound.
+    fn measured(&self, mut found: BoundedMesh, counted: &[ReadPoints]) -> Result<BoundedMesh> {
+        let (bound, mesh) = (found.bound, &found.mesh);
+        let lattice = self.lattice(bound);
+        let tiles = self.tiles.iter().zip(counted).collect();
+        let measured =
+            self.engine.fan_out("measure", tiles, |(tile, ReadPoints { bounds, .. })| {
+                let mut far = FarPoints::new(lattice, bound);
+                if bounds.is_empty() {
+                    return Ok((0.0, far));
+                }
+                let grid = TriangleGrid::new(mesh, bounds, bound);
+                let (most, mut farthest) = ((bound * bound) as f32, 0.0_f32);
+                self.each_point(tile, |world, moves| {
+                    if moves {
+                        return Ok(());
+                    }
+                    let square = grid.square(world, farthest);
+                    if square > most {
+                        far.add(world);
+                    } else {
+                        farthest = farthest.max(square);
+                    }
+                    Ok(())
+                })?;
+                Ok((farthest, far))
+            })?;
+        let mut far = FarPoints::new(lattice, bound);
+        let mut farthest = 0.0_f32;
+        for (own, points) in measured {
+            farthest = farthest.max(own);
+            far.join(points);
+        }
+        let (n_boxes, in_boxes) = far.append_to(&mut found.mesh);
+        found.n_boxes = n_boxes;
+        found.farthest = f64::from(farthest).sqrt().max(in_boxes);
+        Ok(found)
+    }
+
+    /// Passes each point of a tile in the region, and whether it moves with a robot.
+    fn each_point(
+        &self,
+        tile: &str,
+        mut take: impl FnMut([f64; 3], bool) -> Result<()>,
+    ) -> Result<()> {
+        let (path, stated) = self.files.stated(tile)?;
+        read_tile(&path, &self.state.records.las(), stated, |points| {
+            self.engine.cancel.check()?;
+            for point in points {
+                let is_inside = self.region.is_none_or(|region| region.contains(point.world));
+                if is_inside {
+                    let kind = point.label.kind;
+                    take(point.world, matches!(kind, PointKind::Link | PointKind::Attachment))?;
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Joins the meshes of all chunks, eight neighbours at a time.
+fn join_all(
+    mut parts: Vec<([i32; 3], SurfaceMesh)>,
+    error: f64,
+    engine: &Engine,
+) -> Result<SurfaceMesh> {
+    while parts.len() > 1 {
+        let parent = |at: [i32; 3]| at.map(|v| v.div_euclid(2));
+        parts.sort_by_key(|(at, _)| (parent(*at), *at));
+        let mut groups: Vec<([i32; 3], Vec<SurfaceMesh>)> = Vec::new();
+        for (at, mesh) in parts {
+            match groups.last_mut() {
+                Some((own, meshes)) if *own == parent(at) => meshes.push(mesh),
+                _ => groups.push((parent(at), vec![mesh])),
+            }
+        }
+        // Chunks on both sides of the origin have no common parent below it.
+        let is_stuck = groups.len() > 1
+            && groups
+                .iter()
+                .all(|(at, own)| own.len() == 1 && at.iter().all(|v| (-1..=0).contains(v)));
+        if is_stuck {
+            groups = vec![([0; 3], groups.into_iter().flat_map(|(_, own)| own).collect())];
+        }
+        let join = |(at, meshes)| Ok((at, join_surfaces(meshes, error)?));
+        parts = engine.fan_out("join", groups, join)?;
+    }
+    Ok(parts.pop().map(|(_, mesh)| mesh).unwrap_or_default())
+}
+
+/// The surface of all voxels that are unknown in some space and known in none.
+pub(super) fn unknown(
+    spaces: &[Space],
+    region: Option<&Aabb>,
+    engine: &Engine,
+) -> Result<SurfaceMesh> {
+    /// Error up to which flat sides are joined, as a share of a voxel's edge.
+    const FLAT: f64 = 0.01;
+    let Some(edge) = spaces.iter().map(|space| space.grid().edge).reduce(f64::min) else {
+        return Ok(SurfaceMesh::default());
+    };
+    let lattice = VoxelLattice { origin: [0.0; 3], edge };
+    let mut voxels = OccupiedVoxels::new(lattice);
+    let is_known = |at: [f64; 3]| {
+        let kind = |space: &Space| space.grid().index(at).map(|i| space.voxels()[i]);
+        spaces.iter().filter_map(kind).any(|kind| kind != SpaceKind::Unknown)
+    };
+    for space in spaces {
+        engine.cancel.check()?;
+        let all = space.voxels().iter().enumerate();
+        for (at, _) in all.filter(|(_, kind)| **kind == SpaceKind::Unknown) {
+            let middle = space.grid().middle(at);
+            if region.is_none_or(|region| region.contains(middle)) && !is_known(middle) {
+                voxels.add(middle)?;
+            }
+        }
+    }
+    let chunks: Vec<_> = voxels.into_chunks().into_iter().collect();
+    let parts = engine.fan_out("unknown", chunks, |(at, bytes)| {
+        let chunk = ChunkVoxels::cubes(lattice, at, &bytes);
+        Ok((at, chunk_surface(&chunk, &FreeSpace::default(), FLAT * edge)?.mesh))
+    })?;
+    join_all(parts, FLAT * edge, engine)
+}

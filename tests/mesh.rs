@@ -1,0 +1,124 @@
+//! Collision meshes from outside: what is blocked by points is blocked by the mesh, the same bytes
+//! for any number of threads, budgets of triangles, and requests that cannot be met.
+
+mod common;
+
+use common::palletiser;
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use surface::{SurfaceMesh, TriangleGrid};
+
+/// Beams of each scanner.
+const N_BEAMS: u64 = 250_000;
+
+fn program(dir: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
+    command.current_dir(dir).args(args).args(["--progress", "none"]);
+    command.output().expect("the program starts")
+}
+
+/// Exports a mesh; its bytes and its report.
+fn mesh(dir: &Path, more: &[&str]) -> (Vec<u8>, Value) {
+    let args = ["export", "out", "--to", "mesh", "--mesh-format", "ply"];
+    let output = program(dir, &[&args, more].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| std::fs::read(dir.join("out/export/mesh").join(name)).expect("written");
+    let report = serde_json::from_slice(&read("mesh.json")).expect("JSON");
+    assert!(!dir.join("out/export/mesh/scratch").exists(), "the scratch folder is gone");
+    (read("fixed.ply"), report)
+}
+
+/// A mesh that this program wrote as PLY.
+fn of_ply(bytes: &[u8]) -> SurfaceMesh {
+    let end = b"end_header\n";
+    let head = bytes.windows(end.len()).position(|w| w == end).expect("a header") + end.len();
+    let text = std::str::from_utf8(&bytes[..head]).expect("text");
+    let n = |what: &str| -> usize {
+        let line = text.lines().find_map(|line| line.strip_prefix(what)).expect("a count");
+        line.trim().parse().expect("a number")
+    };
+    let (body, faces) = bytes[head..].split_at(24 * n("element vertex "));
+    let mut mesh = SurfaceMesh::default();
+    for v in body.chunks_exact(24) {
+        let at = |i: usize| f64::from_le_bytes(std::array::from_fn(|k| v[8 * i + k]));
+        mesh.vertices.push([at(0), at(1), at(2)]);
+    }
+    for t in faces.chunks_exact(13) {
+        let at = |i: usize| u32::from_le_bytes(std::array::from_fn(|k| t[1 + 4 * i + k]));
+        mesh.triangles.push([at(0), at(1), at(2)]);
+    }
+    assert_eq!(mesh.triangles.len(), n("element face "));
+    mesh
+}
+
+#[test]
+fn what_points_block_the_mesh_blocks() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let dir = dir.path();
+    palletiser(dir, 12, N_BEAMS);
+    let run = program(dir, &["run", "scans/scans.e57", "--robots", "robots", "--out", "out"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+
+    let (bytes, report) = mesh(dir, &["--threads", "2"]);
+    let (again, _) = mesh(dir, &["--threads", "1"]);
+    assert!(bytes == again, "one thread writes another mesh");
+    assert!(report["measured_maximum"].as_f64().expect("measured") <= 0.0101, "{report}");
+    let (all, free) = (&report["area"], &report["area_in_free_space"]);
+    let share = free.as_f64().expect("known") / all.as_f64().expect("an area");
+    assert!(share < 0.005, "{report}");
+
+    // A path into the floor is blocked at places that the mesh is near, too.
+    let text = std::fs::read_to_string(dir.join("out/result.json")).expect("a result");
+    let result: Value = serde_json::from_str(&text).expect("JSON");
+    let joints = result["robots"][0]["joints"].as_object().expect("joints");
+    let names: Vec<&str> = joints.keys().map(String::as_str).collect();
+    let found: Vec<f64> = joints.values().map(|v| v.as_f64().expect("a value")).collect();
+    let mut down = found.clone();
+    (down[1], down[2]) = (1.2, 1.2);
+    let line =
+        |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
+    let path = names.join(",") + "\n" + &line(&found) + &line(&down);
+    std::fs::write(dir.join("path.csv"), path).expect("writes");
+    let checked = program(dir, &["check", "out", "--trajectory", "path.csv", "--json"]);
+    let checked: Value = serde_json::from_slice(&checked.stdout).expect("JSON");
+    let surface = of_ply(&bytes);
+    let mut n = 0;
+    for contact in checked["contacts"].as_array().expect("contacts") {
+        let is_solid = ["fixed", "floor"].iter().any(|what| contact["what"] == *what);
+        if !is_solid || !["hit", "inside"].iter().any(|level| contact["level"] == *level) {
+            continue;
+        }
+        let at = contact["at"].as_array().expect("a place");
+        let at: [f64; 3] = std::array::from_fn(|i| at[i].as_f64().expect("metres"));
+        // The bound, and the cell by which `check` knows a point.
+        let reach = 0.01 + clearance::CELL;
+        let bounds = geometry::Aabb { min: at, max: at };
+        let far = TriangleGrid::new(&surface, &bounds, reach).square(at, 0.0).sqrt();
+        assert!(f64::from(far) <= reach, "{far} m from the mesh: {contact}");
+        n += 1;
+    }
+    assert!(n > 0, "the floor is in the way: {checked}");
+
+    // A budget is kept to and the bound that it takes is stated.
+    let (few, report) = mesh(dir, &["--triangles", "3000"]);
+    assert!(of_ply(&few).triangles.len() <= 3000, "{report}");
+    let (bound, most) = (&report["bound"], &report["measured_maximum"]);
+    assert!(bound.as_f64() > Some(0.01) && most.as_f64() <= bound.as_f64(), "{report}");
+
+    // One robot's surroundings, and what nobody saw of them.
+    let (_, report) = mesh(dir, &["--robot", "R1", "--unknown"]);
+    assert!(report["unknown"]["triangles"].as_u64() > Some(0), "{report}");
+    assert!(report["region"].is_array(), "{report}");
+
+    for (args, code) in [
+        (&["--robot", "R7"][..], 4),
+        (&["--bound", "0"], 2),
+        (&["--bound", "NaN"], 2),
+        (&["--triangles", "0"], 2),
+    ] {
+        let args = [&["export", "out", "--to", "mesh"], args].concat();
+        assert_eq!(program(dir, &args).status.code(), Some(code), "{args:?}");
+    }
+    assert_eq!(program(dir, &["export", "out", "--to", "ply", "--unknown"]).status.code(), Some(2));
+}
