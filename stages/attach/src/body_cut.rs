@@ -6,7 +6,7 @@
 //! another body holds it, and not within, and a bench is not cut off its legs.
 
 use crate::max_flow::{FlowNetwork, UNCUT};
-use crate::thin::Shape;
+use crate::thin::PartShape;
 use crate::voxel_graph::Graph;
 
 /// Cost of an edge between voxels that share a face, an edge or a corner.
@@ -38,7 +38,7 @@ const THIN_FACTOR: u64 = 1000;
 
 /// How a voxel touches a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Contact {
+pub(crate) enum TouchesRobot {
     None,
     Near,
     Touch,
@@ -60,9 +60,9 @@ pub(crate) struct Body<'a> {
     pub(crate) from_hand: Vec<bool>,
     /// Way along the longest tool of the robot, hundredths of a voxel's edge.
     pub(crate) longest_tool: u32,
-    pub(crate) contact: Vec<Contact>,
+    pub(crate) contact: Vec<TouchesRobot>,
     pub(crate) is_fixed: Vec<bool>,
-    pub(crate) shape: Vec<Shape>,
+    pub(crate) shape: Vec<PartShape>,
 }
 
 impl Body<'_> {
@@ -73,13 +73,15 @@ impl Body<'_> {
         let mut network = FlowNetwork::new(n + 2);
         for k in 0..n {
             match self.contact[k] {
-                Contact::None => {}
-                Contact::Near if self.shape[k] != Shape::Hose => {
+                TouchesRobot::None => {}
+                TouchesRobot::Near if self.shape[k] != PartShape::Hose => {
                     network.add(source, k, SCALE * NEAR_COST);
                 }
-                Contact::Near | Contact::Touch => network.add(source, k, SCALE * TOUCH_COST),
+                TouchesRobot::Near | TouchesRobot::Touch => {
+                    network.add(source, k, SCALE * TOUCH_COST)
+                }
             }
-            if self.shape[k] == Shape::Flat && preference == Preference::NearRobot {
+            if self.shape[k] == PartShape::Flat && preference == Preference::NearRobot {
                 network.add(k, sink, SCALE * FLAT_COST);
             } else if self.from_hand[k] && self.length[k] <= BOLTED {
                 network.add(source, k, SCALE * BOLTED_COST);
@@ -108,18 +110,18 @@ impl Body<'_> {
             factor += mounted / u64::from(MOUNT);
         }
         // A hose is as long as it is: nothing along it is nearer to the robot.
-        let is_hose = [a, b].iter().any(|k| self.shape[*k] == Shape::Hose);
+        let is_hose = [a, b].iter().any(|k| self.shape[*k] == PartShape::Hose);
         if preference == Preference::NearRobot && !is_hose {
             factor += u64::from(length.min(GROWS)) * SCALE / u64::from(DOUBLE);
         }
         // A hose is cut where another body holds it, and a leg nowhere.
         let enters_hose = |from: usize, to: usize| {
             let is_beyond = self.length[to] >= self.length[from];
-            is_beyond && self.shape[to] == Shape::Hose
+            is_beyond && self.shape[to] == PartShape::Hose
         };
         let is_held = self.is_fixed[a] || self.is_fixed[b];
         let in_hose = !is_held && (enters_hose(a, b) || enters_hose(b, a));
-        let in_leg = self.shape[a] == Shape::Leg || self.shape[b] == Shape::Leg;
+        let in_leg = self.shape[a] == PartShape::Leg || self.shape[b] == PartShape::Leg;
         EDGE_COST[shared] * factor * if in_hose || in_leg { THIN_FACTOR } else { 1 }
     }
 }

@@ -2,12 +2,12 @@
 //! to a robot.
 
 use crate::attached::{Attached, Decided, Group, attached_to, mark};
-use crate::body_cut::{Body, Contact};
+use crate::body_cut::{Body, TouchesRobot};
 use crate::bridges::bridges;
 use crate::floating::{self, Bodies};
 use crate::settings::Settings;
 use crate::share::{Share, share};
-use crate::thin::{self, Shape};
+use crate::thin::{self, PartShape};
 use crate::voxel_graph::Graph;
 use contract::{Fit, Fold, Label, LinkAt, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
 use robot::{JointKind, Model};
@@ -137,11 +137,11 @@ impl Attach {
         // No tool and nothing that it holds is so far away, which bounds the time of the cuts.
         let too_far = (FAR_TOOLS * longest_tool).max(LEAST_FAR);
         let is_too_far =
-            |k: usize| length[k] > too_far && matches!(shape[k], Shape::Body | Shape::Flat);
+            |k: usize| length[k] > too_far && matches!(shape[k], PartShape::Body | PartShape::Flat);
         let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
-            _ if !self.in_contact(&voxels[*at]) => Contact::None,
-            true => Contact::Touch,
-            false => Contact::Near,
+            _ if !self.in_contact(&voxels[*at]) => TouchesRobot::None,
+            true => TouchesRobot::Touch,
+            false => TouchesRobot::Near,
         };
         let is_fixed = |k: usize| {
             let voxel = &voxels[members[k]];

@@ -3,7 +3,7 @@
 /// The settings of this crate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Contact: a voxel touches a link if one of its points is at most this far from the link,
+    /// TouchesRobot: a voxel touches a link if one of its points is at most this far from the link,
     /// metres. It is the edge of a voxel plus the gate of the segmentation.
     pub contact: f32,
     /// Largest circumference of a thin part of a body, metres: a hose of 60 mm. Such a part moves

@@ -2,7 +2,7 @@
 //! the robot and one that is not.
 
 use crate::body_cut::{Body, Preference};
-use crate::thin::Shape;
+use crate::thin::PartShape;
 use std::collections::BTreeMap;
 
 /// Way along a body from where it touches a robot up to which nothing of it is called fixed because
@@ -35,7 +35,7 @@ pub(crate) enum Share {
 pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let mut near = body.robot_side(Preference::NearRobot);
     let far = body.robot_side(Preference::NearFixed);
-    let is_hose = |k: usize| body.shape[k] == Shape::Hose;
+    let is_hose = |k: usize| body.shape[k] == PartShape::Hose;
     let n = body.graph.len();
     // A cut that leaves more than a tool on the robot's side has not found where the tool ends, nor
     // has one behind which the body is as wide as at the cut: a bench would go with the tool.
@@ -66,7 +66,7 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
 /// the tip that touches it.
 fn is_like_a_tool(body: &Body<'_>, side: &[bool]) -> bool {
     let (mut widths, mut levels) = (BTreeMap::new(), BTreeMap::new());
-    for k in (0..side.len()).filter(|k| side[*k] && body.shape[*k] != Shape::Hose) {
+    for k in (0..side.len()).filter(|k| side[*k] && body.shape[*k] != PartShape::Hose) {
         if body.length[k] > body.longest_tool {
             return false;
         }
@@ -119,4 +119,43 @@ fn layers_behind(body: &Body<'_>, side: &[bool]) -> Vec<Vec<usize>> {
         next
     };
     (0..N_FOLLOWED + N_LAYERS).map(next).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::body_cut::TouchesRobot;
+    use crate::voxel_graph::Graph;
+    use contract::Voxel;
+
+    fn is_a_tool(voxels: &[Voxel]) -> bool {
+        let graph = Graph::new(voxels);
+        let n = voxels.len();
+        let body = Body {
+            graph: &graph,
+            length: voxels.iter().map(|v| 100 * v[2].unsigned_abs()).collect(),
+            from_hand: vec![true; n],
+            longest_tool: 2500,
+            contact: vec![TouchesRobot::None; n],
+            is_fixed: vec![false; n],
+            shape: vec![PartShape::Body; n],
+        };
+        is_like_a_tool(&body, &vec![true; n])
+    }
+
+    /// A solid block of this width between two heights below a hand.
+    fn block(width: i32, heights: std::ops::Range<i32>) -> Vec<Voxel> {
+        let level = |z: i32| (0..width).flat_map(move |x| (0..width).map(move |y| [x, y, -z]));
+        heights.flat_map(level).collect()
+    }
+
+    #[test]
+    fn a_bench_behind_a_tool_is_no_tool() {
+        let tool = block(4, 0..10);
+        assert!(is_a_tool(&tool));
+        // A wide top, a body that is wider than the tool, and one that is too long.
+        assert!(!is_a_tool(&[tool.clone(), block(10, 10..12)].concat()));
+        assert!(!is_a_tool(&[tool.clone(), block(7, 10..16)].concat()));
+        assert!(!is_a_tool(&[tool, block(4, 10..30)].concat()));
+    }
 }

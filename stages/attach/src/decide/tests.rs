@@ -223,3 +223,26 @@ fn mixed_pixels_beside_a_carried_plate_do_not_hold_it() {
     let out = attached(&[vec![link], plate, mixed]);
     assert_eq!(out.label([5, 5, -10]), Label { kind: PointKind::Attachment, robot: 0, link: 1 });
 }
+
+/// A tool whose wide tip stands on a bench with a narrow foot: the least cut is through the foot.
+#[test]
+fn a_bench_with_a_narrow_foot_is_not_taken_with_the_tool_that_touches_it() {
+    let near = |at: Voxel| voxel(at, 1, -at[2]);
+    let (mut tool, mut top) =
+        (shell([-6, -6, -9], [6, 6, 0], near), shell([-12, -12, -12], [12, 12, -10], near));
+    // No scan sees where they touch.
+    let is_hidden = |v: &ResidualVoxel| v.voxel[..2].iter().all(|i| i.abs() < 6);
+    tool.retain(|v| v.voxel[2] > -9 || !is_hidden(v));
+    top.retain(|v| v.voxel[2] < -10 || !is_hidden(v));
+    let mut foot = shell([-2, -2, -20], [2, 2, -13], near);
+    foot.extend(shell([-12, -12, -22], [12, 12, -21], |at| ResidualVoxel {
+        grounded: at[2] == -22,
+        ..near(at)
+    }));
+    let out = attached(&[tool.clone(), top.clone(), foot.clone()]);
+    let n = |of: &[ResidualVoxel], kind: PointKind| {
+        of.iter().filter(|v| out.label(v.voxel).kind == kind).count()
+    };
+    assert_eq!(n(&top, PointKind::Attachment) + n(&foot, PointKind::Attachment), 0);
+    assert_eq!(n(&tool, PointKind::Fixed), 0);
+}

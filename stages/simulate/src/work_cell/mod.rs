@@ -49,13 +49,13 @@ const TOOL_FOOT: f64 = 0.05;
 
 /// A robot that may stand in a scene.
 #[derive(Clone, Copy)]
-struct Candidate<'a> {
+struct WorkRobot<'a> {
     model: &'a Model,
     /// Its reach from the base, metres.
     reach: f64,
 }
 
-impl Candidate<'_> {
+impl WorkRobot<'_> {
     /// Space along the row on each side of its base, metres.
     fn room(&self) -> f64 {
         (0.9 * self.reach).max(0.8)
@@ -70,10 +70,10 @@ const N_SCENES: u64 = 12;
 /// # Errors
 /// `BadInput` if the library holds no robot that fits into such a scene.
 pub fn work_cell(wanted: &WorkCell, models: &[Model]) -> Result<Scene> {
-    let robots: Vec<Candidate<'_>> = models
+    let robots: Vec<WorkRobot<'_>> = models
         .iter()
         .filter(|m| !m.is_tool() && !m.flanges().is_empty())
-        .map(|model| Candidate { model, reach: reach(model) })
+        .map(|model| WorkRobot { model, reach: reach(model) })
         .filter(|candidate| candidate.reach <= MAX_REACH)
         .collect();
     if robots.is_empty() {
@@ -90,15 +90,15 @@ pub fn work_cell(wanted: &WorkCell, models: &[Model]) -> Result<Scene> {
 }
 
 /// The scene of one attempt.
-fn one_cell(wanted: &WorkCell, robots: &[Candidate<'_>], attempt: u64) -> Result<Scene> {
+fn one_cell(wanted: &WorkCell, robots: &[WorkRobot<'_>], attempt: u64) -> Result<Scene> {
     let mut random = Random::keyed(&[wanted.seed, 0x3C9, wanted.work as u64, attempt]);
     let n = match wanted.work {
         Work::Touch | Work::Joined => 1,
         Work::Carry => 2 + random.below(2),
         Work::Hoses => 2,
     };
-    let chosen: Vec<Candidate<'_>> = (0..n).map(|_| robots[random.below(robots.len())]).collect();
-    let half: Vec<f64> = chosen.iter().map(Candidate::room).collect();
+    let chosen: Vec<WorkRobot<'_>> = (0..n).map(|_| robots[random.below(robots.len())]).collect();
+    let half: Vec<f64> = chosen.iter().map(WorkRobot::room).collect();
     let length = 2.0 * half.iter().sum::<f64>();
     let depth = 2.0 * half.iter().copied().fold(0.0, f64::max);
     let size = [(length + 2.0 * AISLE).max(8.0), (depth + 2.0 * AISLE).max(7.0)];
@@ -144,7 +144,7 @@ fn shell(seed: u64, size: [f64; 2], random: &mut Random) -> Scene {
 fn surround(
     scene: &mut Scene,
     work: Work,
-    robots: &[Candidate<'_>],
+    robots: &[WorkRobot<'_>],
     middles: &[f64],
     depth: f64,
     random: &mut Random,
@@ -209,13 +209,13 @@ fn bench_between(scene: &mut Scene, k: usize, x: f64, random: &mut Random) {
 /// Places a robot with its tool in a posture that suits the work.
 fn worker<'a>(
     scene: &mut Scene,
-    candidate: &Candidate<'a>,
+    candidate: &WorkRobot<'a>,
     k: usize,
     x: f64,
     wanted: &WorkCell,
     random: &mut Random,
 ) -> Result<Worker<'a>> {
-    let Candidate { model, reach } = *candidate;
+    let WorkRobot { model, reach } = *candidate;
     let name = format!("R{}", k + 1);
     let stand = if reach < 1.2 { random.between(0.4, 0.85) } else { random.between(0.05, 0.3) };
     let ground = scene.ground(x, 0.0);

@@ -23,7 +23,7 @@ const BENCH: f64 = 0.3;
 
 /// What a tool does with a part below it.
 #[derive(Clone, Copy, PartialEq)]
-enum Contact {
+enum ToolContact {
     /// Its tip rests on the part.
     On,
     /// Its tip ends so far above the part, metres.
@@ -115,25 +115,30 @@ fn touch(scene: &mut Scene, worker: &Worker<'_>, random: &mut Random) {
         return;
     }
     let contact = match (tool.shape, random.below(5)) {
-        (_, 0) => Contact::Above(random.between(0.03, 0.09)),
-        (ToolShape::Gripper, 1..=3) => Contact::Closed,
-        (ToolShape::Torch, 1..=3) => Contact::Sheet,
-        (ToolShape::Cups, 1..=3) => Contact::Pile,
-        _ => Contact::On,
+        (_, 0) => ToolContact::Above(random.between(0.03, 0.09)),
+        (ToolShape::Gripper, 1..=3) => ToolContact::Closed,
+        (ToolShape::Torch, 1..=3) => ToolContact::Sheet,
+        (ToolShape::Cups, 1..=3) => ToolContact::Pile,
+        _ => ToolContact::On,
     };
     let ground = scene.ground(tip.x, tip.y);
     let part = part_below(worker, contact, ground, random);
     let low = part.xyz[2] - 0.5 * part.size[2];
-    if contact == Contact::Pile {
+    if contact == ToolContact::Pile {
         pile(scene, &part, low, ground, random);
     } else {
-        support(scene, &part, low, contact == Contact::Sheet, random);
+        support(scene, &part, low, contact == ToolContact::Sheet, random);
     }
     scene.boxes.push(part);
 }
 
 /// The part below a tool: a box that is turned about the vertical as the tool is.
-fn part_below(worker: &Worker<'_>, contact: Contact, ground: f64, random: &mut Random) -> Cuboid {
+fn part_below(
+    worker: &Worker<'_>,
+    contact: ToolContact,
+    ground: f64,
+    random: &mut Random,
+) -> Cuboid {
     let world_from_tool = worker.world_from_tool().unwrap_or_default();
     let length = worker.tool.as_ref().map_or(0.0, |(_, tool)| tool.length);
     let tip = world_from_tool * Point::new(0.0, 0.0, length);
@@ -147,8 +152,8 @@ fn part_below(worker: &Worker<'_>, contact: Contact, ground: f64, random: &mut R
     };
     let mut top = tip.z + PRESSED;
     match contact {
-        Contact::Above(gap) => top = tip.z - gap,
-        Contact::Closed => {
+        ToolContact::Above(gap) => top = tip.z - gap,
+        ToolContact::Closed => {
             // The fingers end at 0.205 and −0.185 lengths beside the axis of the tool.
             part.size = [
                 0.42 * length - 0.028,
@@ -160,10 +165,10 @@ fn part_below(worker: &Worker<'_>, contact: Contact, ground: f64, random: &mut R
             part.xyz[0] += shift.x;
             part.xyz[1] += shift.y;
         }
-        Contact::Sheet => {
+        ToolContact::Sheet => {
             part.size = [random.between(0.4, 0.7), random.between(0.3, 0.6), 0.006];
         }
-        Contact::On | Contact::Pile => {}
+        ToolContact::On | ToolContact::Pile => {}
     }
     part.size[2] = part.size[2].min(top - ground - 0.05);
     part.xyz[2] = top - 0.5 * part.size[2];
