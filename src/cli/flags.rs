@@ -191,8 +191,7 @@ pub(super) struct ExportFlags {
     /// Folder in which the scans lie now, for e57 and ptx (default: where the run found them)
     #[arg(long, value_name = "DIR")]
     pub(super) inputs: Option<PathBuf>,
-    /// Leave moving points out instead of flagging them as invalid, for e57; rows and columns of
-    /// the others stay
+    /// Leave moving points out instead of flagging them as invalid, for e57
     #[arg(long)]
     pub(super) drop_moving: bool,
     /// Write no classes, robots and links, for e57: for readers that refuse extensions

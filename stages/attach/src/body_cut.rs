@@ -6,14 +6,13 @@
 //! another body holds it, and not within, and a bench is not cut off its legs.
 
 use crate::max_flow::{FlowNetwork, UNCUT};
-use crate::thin::PartShape;
+use crate::thin::LocalShape;
 use crate::voxel_graph::Graph;
 
 /// Cost of an edge between voxels that share a face, an edge or a corner.
 const EDGE_COST: [u64; 3] = [4, 2, 1];
 /// Cost of letting go of a voxel that is near the robot, and of one that touches it. A flat wall
-/// beside an arm is near it with an area, and the cut around that area costs more than letting go. A
-/// hose that begins near an arm is clamped to it.
+/// beside an arm is near it with an area, and the cut around that area costs more than letting go.
 const NEAR_COST: u64 = 1;
 const TOUCH_COST: u64 = 400;
 /// Way along the body from the robot up to which a cut costs more, hundredths of a voxel's edge
@@ -62,7 +61,7 @@ pub(crate) struct Body<'a> {
     pub(crate) longest_tool: u32,
     pub(crate) contact: Vec<TouchesRobot>,
     pub(crate) is_fixed: Vec<bool>,
-    pub(crate) shape: Vec<PartShape>,
+    pub(crate) shape: Vec<LocalShape>,
 }
 
 impl Body<'_> {
@@ -74,14 +73,10 @@ impl Body<'_> {
         for k in 0..n {
             match self.contact[k] {
                 TouchesRobot::None => {}
-                TouchesRobot::Near if self.shape[k] != PartShape::Hose => {
-                    network.add(source, k, SCALE * NEAR_COST);
-                }
-                TouchesRobot::Near | TouchesRobot::Touch => {
-                    network.add(source, k, SCALE * TOUCH_COST)
-                }
+                TouchesRobot::Near => network.add(source, k, SCALE * NEAR_COST),
+                TouchesRobot::Touch => network.add(source, k, SCALE * TOUCH_COST),
             }
-            if self.shape[k] == PartShape::Flat && preference == Preference::NearRobot {
+            if self.shape[k] == LocalShape::Flat && preference == Preference::NearRobot {
                 network.add(k, sink, SCALE * FLAT_COST);
             } else if self.from_hand[k] && self.length[k] <= BOLTED {
                 network.add(source, k, SCALE * BOLTED_COST);
@@ -110,18 +105,18 @@ impl Body<'_> {
             factor += mounted / u64::from(MOUNT);
         }
         // A hose is as long as it is: nothing along it is nearer to the robot.
-        let is_hose = [a, b].iter().any(|k| self.shape[*k] == PartShape::Hose);
+        let is_hose = [a, b].iter().any(|k| self.shape[*k] == LocalShape::Hose);
         if preference == Preference::NearRobot && !is_hose {
             factor += u64::from(length.min(GROWS)) * SCALE / u64::from(DOUBLE);
         }
         // A hose is cut where another body holds it, and a leg nowhere.
         let enters_hose = |from: usize, to: usize| {
             let is_beyond = self.length[to] >= self.length[from];
-            is_beyond && self.shape[to] == PartShape::Hose
+            is_beyond && self.shape[to] == LocalShape::Hose
         };
         let is_held = self.is_fixed[a] || self.is_fixed[b];
         let in_hose = !is_held && (enters_hose(a, b) || enters_hose(b, a));
-        let in_leg = self.shape[a] == PartShape::Leg || self.shape[b] == PartShape::Leg;
+        let in_leg = self.shape[a] == LocalShape::Leg || self.shape[b] == LocalShape::Leg;
         EDGE_COST[shared] * factor * if in_hose || in_leg { THIN_FACTOR } else { 1 }
     }
 }

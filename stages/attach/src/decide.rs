@@ -7,7 +7,7 @@ use crate::bridges::bridges;
 use crate::floating::{self, Bodies};
 use crate::settings::Settings;
 use crate::share::{Share, share};
-use crate::thin::{self, PartShape};
+use crate::thin::{self, LocalShape};
 use crate::voxel_graph::Graph;
 use contract::{Fit, Fold, Label, LinkAt, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
 use robot::{JointKind, Model};
@@ -136,8 +136,9 @@ impl Attach {
         let longest_tool = self.tools.get(usize::from(link.robot)).copied().unwrap_or(0);
         // No tool and nothing that it holds is so far away, which bounds the time of the cuts.
         let too_far = (FAR_TOOLS * longest_tool).max(LEAST_FAR);
-        let is_too_far =
-            |k: usize| length[k] > too_far && matches!(shape[k], PartShape::Body | PartShape::Flat);
+        let is_too_far = |k: usize| {
+            length[k] > too_far && matches!(shape[k], LocalShape::Body | LocalShape::Flat)
+        };
         let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
             _ if !self.in_contact(&voxels[*at]) => TouchesRobot::None,
             true => TouchesRobot::Touch,
@@ -217,6 +218,7 @@ impl Fold for Attach {
         }
         let bodies = Bodies {
             gap: self.settings.gap,
+            thin: self.settings.thin,
             voxels: &residual,
             components: &components,
             links: &links,

@@ -3,7 +3,8 @@
 
 use crate::attached::{Decided, Group, attached_to, mark};
 use crate::near_voxels::NearVoxels;
-use contract::{Label, LinkAt, PointKind, ResidualVoxel};
+use crate::thin::{is_line, spreads_of};
+use contract::{Label, LinkAt, PointKind, ResidualVoxel, Voxel};
 
 /// Least distance from everything fixed, metres, and in distances from the hand.
 const ALONE: f64 = 0.10;
@@ -16,10 +17,17 @@ const BIT_GAP: f64 = 0.08;
 const MIN_BIT: usize = 3;
 /// Bodies with fewer voxels are mixed pixels as well.
 const MIN_VOXELS: usize = 8;
+/// Standard deviation along a wire, voxels (at least 20 cm of it are seen), and how many times that
+/// across it is smaller.
+const WIRE: f64 = 2.9;
+const WIRE_RATIO: f64 = 5.0;
+
 /// The residual voxels of a plant as bodies.
 pub(crate) struct Bodies<'a> {
     /// Largest distance of a body from a hand or from what the hand carries, metres.
     pub(crate) gap: f64,
+    /// Largest circumference of a thin part, metres.
+    pub(crate) thin: f64,
     pub(crate) voxels: &'a [ResidualVoxel],
     /// Connected components of the voxels.
     pub(crate) components: &'a [Vec<usize>],
@@ -40,7 +48,7 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
         let is_free = members
             .iter()
             .all(|&at| decided.labels[at].is_none() && !(bodies.is_fixed)(&bodies.voxels[at]));
-        if is_free {
+        if is_free && !is_wire(bodies, members) {
             if members.len() >= MIN_BIT {
                 bits.push(members);
             }
@@ -82,6 +90,15 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
         }
         decided.groups.push(group);
     }
+}
+
+/// Whether connected voxels lie along a line that is longer than bits of tools: a wire or a cable,
+/// whose ends no scan saw, is nothing that a hand carries.
+fn is_wire(bodies: &Bodies<'_>, members: &[usize]) -> bool {
+    let Some(first) = members.first() else { return false };
+    let voxels: Vec<Voxel> = members.iter().map(|at| bodies.voxels[*at].voxel).collect();
+    let spread = spreads_of(&voxels, bodies.voxels[*first].voxel);
+    spread[2] >= WIRE && is_line(&spread, bodies.thin, WIRE_RATIO)
 }
 
 /// Joins bits with small gaps between them to bodies.

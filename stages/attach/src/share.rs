@@ -1,8 +1,8 @@
 //! Shares out a body that reaches both a robot and something fixed, by two cuts: one that is near
 //! the robot and one that is not.
 
-use crate::body_cut::{Body, Preference};
-use crate::thin::PartShape;
+use crate::body_cut::{Body, Preference, TouchesRobot};
+use crate::thin::LocalShape;
 use std::collections::BTreeMap;
 
 /// Way along a body from where it touches a robot up to which nothing of it is called fixed because
@@ -35,7 +35,7 @@ pub(crate) enum Share {
 pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let mut near = body.robot_side(Preference::NearRobot);
     let far = body.robot_side(Preference::NearFixed);
-    let is_hose = |k: usize| body.shape[k] == PartShape::Hose;
+    let is_hose = |k: usize| body.shape[k] == LocalShape::Hose;
     let n = body.graph.len();
     // A cut that leaves more than a tool on the robot's side has not found where the tool ends, nor
     // has one behind which the body is as wide as at the cut: a bench would go with the tool.
@@ -47,6 +47,8 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     } else {
         DOUBT
     };
+    // What is only near the robot may stand beside it, as a wire does; no tool is looked for there.
+    let doubt = if body.contact.contains(&TouchesRobot::Touch) { DOUBT } else { 0 };
     // One voxel beside a cut may be on either side of it, and two where it is no hose that is cut.
     let once = inside(body, &near);
     let twice = inside(body, &once);
@@ -54,7 +56,7 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
         let is_held = twice[k] && body.length[k] <= held || once[k] && is_hose(k);
         match (near[k], far[k]) {
             (true, true) if is_held => Share::Robot,
-            (false, false) if body.length[k] > DOUBT || body.is_fixed[k] => Share::Fixed,
+            (false, false) if body.length[k] > doubt || body.is_fixed[k] => Share::Fixed,
             _ => Share::Open,
         }
     };
@@ -66,7 +68,7 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
 /// the tip that touches it.
 fn is_like_a_tool(body: &Body<'_>, side: &[bool]) -> bool {
     let (mut widths, mut levels) = (BTreeMap::new(), BTreeMap::new());
-    for k in (0..side.len()).filter(|k| side[*k] && body.shape[*k] != PartShape::Hose) {
+    for k in (0..side.len()).filter(|k| side[*k] && body.shape[*k] != LocalShape::Hose) {
         if body.length[k] > body.longest_tool {
             return false;
         }
@@ -124,7 +126,6 @@ fn layers_behind(body: &Body<'_>, side: &[bool]) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body_cut::TouchesRobot;
     use crate::voxel_graph::Graph;
     use contract::Voxel;
 
@@ -138,7 +139,7 @@ mod tests {
             longest_tool: 2500,
             contact: vec![TouchesRobot::None; n],
             is_fixed: vec![false; n],
-            shape: vec![PartShape::Body; n],
+            shape: vec![LocalShape::Body; n],
         };
         is_like_a_tool(&body, &vec![true; n])
     }

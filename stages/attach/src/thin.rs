@@ -25,7 +25,7 @@ const BLUR: f64 = 0.3;
 
 /// What a voxel is part of, by the shape of the body around it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PartShape {
+pub(crate) enum LocalShape {
     /// Anything that does not run on in one direction.
     Body,
     /// A long thin part that begins at the robot and is thin from there on.
@@ -36,21 +36,21 @@ pub(crate) enum PartShape {
     Flat,
 }
 
-/// The shape around each voxel of a component. `length` is the way along the body from the robot to
-/// each of them (hundredths of a voxel's edge), and `thin` the largest circumference of a thin part,
-/// metres.
-pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<PartShape> {
+/// The shape around each voxel of a component. `length` is the way along the body from the robot
+/// to each of them (hundredths of a voxel's edge), and `thin` the largest circumference of a thin
+/// part, metres.
+pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<LocalShape> {
     let n = graph.len();
     let mut ball = Ball { graph, seen_for: vec![usize::MAX; n], members: Vec::new() };
     let around: Vec<([f64; 3], usize)> = (0..n).map(|at| ball.spreads(at)).collect();
     let is_thin: Vec<bool> =
         around.iter().map(|(spread, _)| is_line(spread, thin, MIN_RATIO)).collect();
     let shape = |(spread, n): &([f64; 3], usize)| match is_line(spread, thin, MIN_RATIO) {
-        true => PartShape::Leg,
-        false if is_flat(spread, *n) => PartShape::Flat,
-        false => PartShape::Body,
+        true => LocalShape::Leg,
+        false if is_flat(spread, *n) => LocalShape::Flat,
+        false => LocalShape::Body,
     };
-    let mut shapes: Vec<PartShape> = around.iter().map(shape).collect();
+    let mut shapes: Vec<LocalShape> = around.iter().map(shape).collect();
     let beginnings = (0..n).filter(|k| length[*k] <= BEGINS).collect();
     let mut is_left = is_thin.clone();
     let mut is_hose = vec![false; n];
@@ -62,7 +62,7 @@ pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<PartShape>
             let part = reached(graph, vec![first], &mut is_hose);
             let ways = || part.iter().map(|k| length[*k]);
             let span = ways().max().unwrap_or(0) - ways().min().unwrap_or(0);
-            let shape = if span >= MIN_HOSE { PartShape::Hose } else { PartShape::Body };
+            let shape = if span >= MIN_HOSE { LocalShape::Hose } else { LocalShape::Body };
             part.into_iter().for_each(|k| shapes[k] = shape);
         }
     }

@@ -246,3 +246,10 @@ fn a_bench_with_a_narrow_foot_is_not_taken_with_the_tool_that_touches_it() {
     assert_eq!(n(&top, PointKind::Attachment) + n(&foot, PointKind::Attachment), 0);
     assert_eq!(n(&tool, PointKind::Fixed), 0);
 }
+
+#[test]
+fn a_wire_beside_a_hand_stays_where_it_is() {
+    let link = ResidualVoxel { n_residual: 0, n_link: 9, ..voxel([0, 0, 0], 1, 0) };
+    let wire: Vec<_> = (-15..15).map(|z| voxel([6, z / 3, z], 1, 99)).collect();
+    assert!(attached(&[vec![link], wire]).voxels.is_empty());
+}
