@@ -4,7 +4,7 @@
 use crate::attached::{Decided, Group, attached_to, mark};
 use crate::near_voxels::NearVoxels;
 use crate::thin::{is_line, spreads_of};
-use contract::{Label, LinkAt, PointKind, ResidualVoxel, Voxel};
+use contract::{LinkAt, PointKind, ResidualVoxel, Voxel};
 
 /// Least distance from everything fixed, metres, and in distances from the hand.
 const ALONE: f64 = 0.10;
@@ -69,7 +69,7 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
     }
     let mut open = joined(bodies, &bits);
     open.retain(|members| members.len() >= MIN_VOXELS);
-    while let Some((which, mark, label)) = nearest(bodies, &open, &hands, &fixed) {
+    while let Some((which, mark)) = nearest(bodies, &open, &hands, &fixed) {
         let members = open.remove(which);
         let mut group = Group {
             link: LinkAt { robot: (mark >> 16) as u16, link: (mark & 0xffff) as u16 },
@@ -79,14 +79,10 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
             is_cut: false,
         };
         for at in members {
-            decided.labels[at] = Some(label);
-            if label == Label::UNCERTAIN {
-                group.n_uncertain += 1;
-            } else {
-                group.n_attached += 1;
-                group.n_points += u64::from(bodies.voxels[at].n_residual);
-                hands.add(bodies.voxels[at].voxel, mark);
-            }
+            decided.labels[at] = Some(attached_to(mark));
+            group.n_attached += 1;
+            group.n_points += u64::from(bodies.voxels[at].n_residual);
+            hands.add(bodies.voxels[at].voxel, mark);
         }
         decided.groups.push(group);
     }
@@ -130,15 +126,15 @@ fn joined(bodies: &Bodies<'_>, bits: &[&[usize]]) -> Vec<Vec<usize>> {
     out
 }
 
-/// The body that is nearest to a hand and farther from everything fixed, by its place in `open`,
-/// with the mark of the hand and its label.
+/// The body that is nearest to a hand and far from everything fixed, by its place in `open`, with
+/// the mark of the hand.
 fn nearest(
     bodies: &Bodies<'_>,
     open: &[Vec<usize>],
     hands: &NearVoxels,
     fixed: &NearVoxels,
-) -> Option<(usize, u32, Label)> {
-    let mut best: Option<(f64, usize, u32, Label)> = None;
+) -> Option<(usize, u32)> {
+    let mut best: Option<(f64, usize, u32)> = None;
     for (which, members) in open.iter().enumerate() {
         let places = || members.iter().map(|&at| bodies.voxels[at].voxel);
         let Some((gap, mark)) = hands.nearest(places(), bodies.gap) else { continue };
@@ -147,9 +143,9 @@ fn nearest(
         }
         let apart =
             fixed.nearest(places(), ALONE_RATIO * bodies.gap).map_or(f64::INFINITY, |f| f.0);
-        let is_alone = apart >= ALONE.max(ALONE_RATIO * gap);
-        let label = if is_alone { attached_to(mark) } else { Label::UNCERTAIN };
-        best = Some((gap, which, mark, label));
+        if apart >= ALONE.max(ALONE_RATIO * gap) {
+            best = Some((gap, which, mark));
+        }
     }
-    best.map(|(_, which, mark, label)| (which, mark, label))
+    best.map(|(_, which, mark)| (which, mark))
 }

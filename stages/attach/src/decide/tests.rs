@@ -199,7 +199,7 @@ fn a_plate_in_the_air_belongs_to_the_hand_beside_it_unless_a_bench_is_as_near() 
         ..voxel(at, 1, 99)
     });
     let out = attached(&[vec![link], plate, bench]);
-    assert_eq!(out.label([5, 5, -10]), Label::UNCERTAIN);
+    assert_eq!(out.label([5, 5, -10]), Label::FIXED);
 }
 
 #[test]
