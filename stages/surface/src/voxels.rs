@@ -86,9 +86,7 @@ impl VoxelPoints {
         self.n = self.n.saturating_add(1);
         if self.n_summed < MOST_SUMMED {
             self.n_summed += 1;
-            for i in 0..3 {
-                self.sum[i] += u32::from(inside[i]);
-            }
+            self.sum.iter_mut().zip(inside).for_each(|(sum, v)| *sum += u32::from(v));
         }
     }
 
@@ -98,9 +96,7 @@ impl VoxelPoints {
         // Sums of two parts that are both full would not fit; the first by size stands for both.
         if self.n_summed.saturating_add(other.n_summed) <= MOST_SUMMED {
             self.n_summed += other.n_summed;
-            for i in 0..3 {
-                self.sum[i] += other.sum[i];
-            }
+            self.sum.iter_mut().zip(other.sum).for_each(|(sum, v)| *sum += v);
         } else if (other.n_summed, other.sum) > (self.n_summed, self.sum) {
             (self.n_summed, self.sum) = (other.n_summed, other.sum);
         }
