@@ -7,8 +7,8 @@ use geometry::{STL_HEAD, STL_TRIANGLE, binary_stl, stl_corners};
 use std::collections::BTreeMap;
 
 pub(super) fn read(bytes: &[u8]) -> Result<Soup, String> {
-    let claimed = (bytes.get(80..STL_HEAD))
-        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let claimed =
+        (bytes.get(80..STL_HEAD)).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let expected = claimed.map(|n| STL_HEAD + n * STL_TRIANGLE);
     if expected == Some(bytes.len()) {
         return binary(bytes);
