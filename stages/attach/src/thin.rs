@@ -13,6 +13,14 @@ const BEGINS: u32 = 400;
 /// Least length of a hose, hundredths of a voxel's edge (35 cm): longer than the fingers of a
 /// gripper with a slender part between them.
 const MIN_HOSE: u32 = 1750;
+/// Way from the robot within which a longer hose begins, hundredths of a voxel's edge (20 cm), and
+/// the least length of such a one (60 cm).
+const BEGINS_LATE: u32 = 1000;
+const MIN_LATE_HOSE: u32 = 3000;
+/// Way along a hose from its beginning over which it is one curve, hundredths of a voxel's edge (10
+/// to 14 cm), and largest distance between places on it there, voxels (16 cm).
+const NEXT: std::ops::Range<u32> = 500..700;
+const ONE_END: i32 = 8;
 /// Least number of voxels within [`AROUND`] of one on a flat surface: two thirds of a disc.
 const MIN_FLAT: usize = 35;
 /// Largest standard deviation of a flat surface from its plane, voxels: it may cross a layer.
@@ -57,6 +65,7 @@ pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<LocalShape
     for k in reached(graph, beginnings, &mut is_left) {
         is_hose[k] = is_thin[k];
     }
+    mark_late_hoses(graph, length, &mut is_left, &mut is_hose);
     for first in 0..n {
         if is_hose[first] {
             let part = reached(graph, vec![first], &mut is_hose);
@@ -67,6 +76,48 @@ pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<LocalShape
         }
     }
     shapes
+}
+
+/// Marks long thin parts that begin not far from the robot, where several hoses lie side by side.
+/// Such a part leads away from the robot with one end; a pipe that passes does so with both.
+fn mark_late_hoses(graph: &Graph, length: &[u32], is_left: &mut [bool], is_hose: &mut [bool]) {
+    for first in 0..is_left.len() {
+        if !is_left[first] {
+            continue;
+        }
+        let part = reached(graph, vec![first], is_left);
+        let ways = || part.iter().map(|k| length[*k]);
+        let (begins, ends) = (ways().min().unwrap_or(0), ways().max().unwrap_or(0));
+        if begins > BEGINS_LATE || ends - begins < MIN_LATE_HOSE {
+            continue;
+        }
+        let next = part.iter().filter(|k| NEXT.contains(&(length[**k] - begins)));
+        let places: Vec<Voxel> = next.map(|k| graph.voxel(*k)).collect();
+        let is_one = |at: &Voxel| (0..3).all(|i| (at[i] - places[0][i]).abs() <= ONE_END);
+        if places.iter().all(is_one) {
+            for k in part {
+                is_hose[k] = true;
+                if length[k] == begins {
+                    mark_way_back(graph, length, k, is_hose);
+                }
+            }
+        }
+    }
+}
+
+/// Marks the shortest way from a voxel back to the robot.
+fn mark_way_back(graph: &Graph, length: &[u32], from: usize, is_hose: &mut [bool]) {
+    let mut at = from;
+    while length[at] > 0 {
+        let Some((next, _)) = graph.neighbours(at).min_by_key(|(k, _)| (length[*k], *k)) else {
+            return;
+        };
+        if length[next] >= length[at] {
+            return;
+        }
+        is_hose[next] = true;
+        at = next;
+    }
 }
 
 /// The voxels that are reached from some of them, with these, through those that are left; they are
