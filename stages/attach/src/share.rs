@@ -28,12 +28,12 @@ const N_BESIDE: usize = 3;
 /// finger, 10 cm, and that of a thin neck, 40 cm.
 const N_FOLLOWED: usize = 5;
 const N_FOLLOWED_NECK: usize = 20;
-/// Largest number of voxels in a layer of a thin neck, of 4 cm, and how many times longer than thick
+/// Largest number of voxels in a layer of a thin neck, of 6 cm, and how many times longer than thick
 /// it is.
-const THIN_NECK: usize = 8;
+const THIN_NECK: usize = 12;
 const NECK_RATIO: f64 = 3.0;
 /// Least number of voxels in a layer of a neck with which what is behind it is compared.
-const LEAST_NECK: usize = 3;
+const LEAST_NECK: usize = 6;
 
 /// To whom a voxel belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,10 +54,12 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let n = body.graph.len();
     // A cut that leaves more than a tool on the robot's side has not found where the tool ends, nor
     // has one behind which the body is as wide as at the cut: a bench would go with the tool.
-    let is_tool = is_like_a_tool(body, &near);
+    let is_whole = is_whole(body, &near);
+    let is_tool = is_whole || is_like_a_tool(body, &near);
     let tip = up_to_where_it_widens(body, &near).filter(|tip| is_tool && is_like_a_tool(body, tip));
     let has_tip = tip.is_some();
     let held = match is_tool {
+        true if is_whole => u32::MAX,
         true if has_tip || is_narrow(body, &near) => body.longest_tool,
         true => DOUBT,
         false => MOUNT,
@@ -79,6 +81,12 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
         }
     };
     (0..n).map(share).collect()
+}
+
+/// Whether only hoses lead from a side to what is not on it: all else hangs on the robot.
+fn is_whole(body: &Body<'_>, side: &[bool]) -> bool {
+    let mut others = (0..side.len()).filter(|k| side[*k] && body.shape[*k] != LocalShape::Hose);
+    others.all(|k| body.graph.neighbours(k).all(|(other, _)| side[other]))
 }
 
 /// Whether what is on the robot's side of a cut may be a tool, hoses aside: it is no longer than

@@ -297,3 +297,16 @@ fn a_hose_that_leaves_a_bundle_moves_and_a_pipe_that_passes_does_not() {
     let [n, of] = moving_beside_a_bundle(pipe.collect());
     assert!(n * 10 <= of, "{n} of {of}");
 }
+
+#[test]
+fn a_tool_that_only_a_hose_joins_to_the_building_moves_whole() {
+    // A slender mount, wide cups, and a hose from the mount to the ceiling.
+    let near = |at: Voxel| voxel(at, 1, -at[2]);
+    let mut tool = shell([-1, -1, -20], [1, 1, 0], near);
+    tool.extend(shell([-9, -9, -23], [9, 9, -21], near));
+    let hose =
+        (2..80).map(|k| ResidualVoxel { at_border: k >= 78, ..voxel([k, 0, k / 2 - 8], 1, k) });
+    let out = attached(&[tool.clone(), hose.collect()]);
+    let n = tool.iter().filter(|v| out.label(v.voxel).kind == PointKind::Attachment).count();
+    assert!(n * 20 >= tool.len() * 19, "{n} of {}", tool.len());
+}
