@@ -1,0 +1,52 @@
+//! The motion of each thing that moved, from what both sessions saw of it: the displacement of a
+//! stated point of the thing, its turn about the vertical, and their uncertainty.
+//!
+//! 1. The points of the thing are gathered from both sessions, thinned (`points`), and get normals
+//!    (`surfels`).
+//! 2. Turns and places from which to start are aligned, point to plane, where surfaces overlap;
+//!    beams of one session that pass where the other one has the thing count against a motion
+//!    (`search`, `align`).
+//! 3. Directions in which the common faces determine nothing are determined by the ends of the
+//!    thing, or are open (`slide`).
+//! 4. Other turns that explain the points as well are named; the stated point is the one that all
+//!    of them move alike (`motion`).
+
+mod align;
+pub(crate) mod motion;
+mod points;
+mod search;
+mod slide;
+mod surfels;
+
+pub use motion::{ThingMotion, UnknownMotion};
+pub use points::{ThingPoints, ThingVoxels};
+pub use search::PassedPlaces;
+
+use crate::things::{Thing, ThingChange};
+use contract::Fan;
+use geometry::Vector;
+use motion::motion;
+
+/// Finds the motion of each of those `things` that moved, from its points in the earlier and in the
+/// later session. One task a thing runs on `fan`.
+pub fn find_motions(
+    things: &mut [Thing],
+    points: &[ThingPoints; 2],
+    passed: &dyn PassedPlaces,
+    fan: &dyn Fan,
+) {
+    let moved: Vec<usize> =
+        (0..things.len()).filter(|&i| things[i].change == ThingChange::Moved).collect();
+    let found = fan.fan(moved.clone(), |i| {
+        let means = points.each_ref().map(|session| session.means(i));
+        let sides = means.each_ref().map(|means| surfels::surfels(means));
+        let places = means.map(|means| means.iter().map(|m| m.0).collect::<Vec<Vector>>());
+        motion(sides, places, passed)
+    });
+    for (i, found) in moved.into_iter().zip(found) {
+        things[i].motion = Some(found);
+    }
+}
+
+#[cfg(test)]
+mod tests;
