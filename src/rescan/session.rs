@@ -6,7 +6,6 @@ use super::earlier_result::EarlierResult;
 use super::new_points;
 use super::new_points::NewPoints;
 use super::robots::{Observed, RobotState, compare_robot};
-use super::thing_points::MovedPoints;
 use crate::detect::ground::Ground;
 use crate::detect::robots::{FittedRobots, RobotList};
 use crate::detect::robots::{region, standing};
@@ -17,7 +16,7 @@ use crate::label::known_space::reach;
 use crate::label::labelling::{Labelling, ScansToLabel};
 use crate::label::near_robots::NearRobots;
 use crate::store::Store;
-use change::{SessionOccupancy, Thing, ThingChange, ThingVoxels, UnobservedRegion, things};
+use change::{SessionOccupancy, Thing, UnobservedRegion, things};
 use contract::{
     Cluster, Error, Fit, Floor, Kind, Region, Result, ScanId, TILE_SIDE, Verdict, View,
 };
@@ -276,35 +275,6 @@ impl<'a> CellComparison<'a> {
         }
         self.find_motions(plant.view(), &robots, &mut labels, engine)?;
         Ok((robots, labels))
-    }
-
-    /// Finds how far things moved.
-    fn find_motions(
-        &self,
-        plant: FittedRobots<'_>,
-        robots: &ComparedRobots,
-        labels: &mut CellLabels,
-        engine: &Engine,
-    ) -> Result<()> {
-        if labels.things.iter().all(|thing| thing.change != ThingChange::Moved) {
-            return Ok(());
-        }
-        let voxels = ThingVoxels::of(&labels.things, [&labels.compared.then, &labels.now]);
-        let own = self.own_fits(plant.fits, robots);
-        let labelling = self.labelling(FittedRobots { fits: &own, ..plant });
-        let (watch, old_watch) = (self.watch(), VisibilityQuery::new(&self.cell, &self.old_views));
-        let missed = self.missed(plant, robots, engine)?;
-        let moved = MovedPoints {
-            voxels: &voxels,
-            past: self.past,
-            missed: missed.as_ref(),
-            scans: &self.sources.scans,
-            store: self.store,
-            near: &labels.near,
-            ground: labelling.ground(),
-            beams: [&old_watch, &watch],
-        };
-        moved.find(&mut labels.things, engine)
     }
 
     fn known_robots(&self, plant: &mut RobotList, engine: &Engine) -> Result<ComparedRobots> {

@@ -2,33 +2,68 @@
 //! how far each of them moved.
 
 use super::earlier_points::{EarlierPoints, World};
+use super::session::{CellComparison, CellLabels, ComparedRobots};
+use crate::detect::robots::FittedRobots;
 use crate::engine::{AllThreads, Engine};
 use crate::label::near_robots::NearRobots;
 use crate::store::Store;
-use change::{PassedPlaces, Thing, ThingPoints, ThingVoxels, find_motions};
+use change::{
+    SessionBeams, SessionEvidence, Thing, ThingChange, ThingPoints, ThingVoxels, find_motions,
+};
 use contract::{Label, Map, PointKind, Result, Scan, Tile, Weigh};
 use freespace::{Visibility, VisibilityQuery};
 use geometry::Aabb;
 use segment::FloorHeights;
 
 /// Both sessions of a cell in which things moved.
-pub(crate) struct MovedPoints<'a> {
-    pub(crate) voxels: &'a ThingVoxels,
-    pub(crate) past: &'a EarlierPoints<'a>,
+struct MovedPoints<'a> {
+    voxels: &'a ThingVoxels,
+    past: &'a EarlierPoints<'a>,
     /// Labels of robots that the earlier result missed.
-    pub(crate) missed: Option<&'a NearRobots>,
-    pub(crate) scans: &'a [Scan],
-    pub(crate) store: &'a Store,
+    missed: Option<&'a NearRobots>,
+    scans: &'a [Scan],
+    store: &'a Store,
     /// Labels of the new points near robots.
-    pub(crate) near: &'a NearRobots,
-    pub(crate) ground: &'a FloorHeights,
+    near: &'a NearRobots,
+    ground: &'a FloorHeights,
     /// Look-up in the earlier scans and in the new ones.
-    pub(crate) beams: [&'a VisibilityQuery<'a>; 2],
+    beams: [&'a VisibilityQuery<'a>; 2],
+}
+
+impl CellComparison<'_> {
+    /// Finds how far the things that moved did so.
+    pub(super) fn find_motions(
+        &self,
+        plant: FittedRobots<'_>,
+        robots: &ComparedRobots,
+        labels: &mut CellLabels,
+        engine: &Engine,
+    ) -> Result<()> {
+        if labels.things.iter().all(|thing| thing.change != ThingChange::Moved) {
+            return Ok(());
+        }
+        let voxels = ThingVoxels::of(&labels.things, [&labels.compared.then, &labels.now]);
+        let own = self.own_fits(plant.fits, robots);
+        let labelling = self.labelling(FittedRobots { fits: &own, ..plant });
+        let (watch, old_watch) = (self.watch(), VisibilityQuery::new(&self.cell, &self.old_views));
+        let missed = self.missed(plant, robots, engine)?;
+        let moved = MovedPoints {
+            voxels: &voxels,
+            past: self.past,
+            missed: missed.as_ref(),
+            scans: &self.sources.scans,
+            store: self.store,
+            near: &labels.near,
+            ground: labelling.ground(),
+            beams: [&old_watch, &watch],
+        };
+        moved.find(&mut labels.things, engine)
+    }
 }
 
 impl MovedPoints<'_> {
     /// Finds the motions of the things that moved.
-    pub(crate) fn find(&self, things: &mut [Thing], engine: &Engine) -> Result<()> {
+    fn find(&self, things: &mut [Thing], engine: &Engine) -> Result<()> {
         let points = [
             gather(self.past.store, self.voxels.bounds(0), &EarlierOfThings(self), engine)?,
             gather(self.store, self.voxels.bounds(1), &LaterOfThings(self), engine)?,
@@ -38,9 +73,15 @@ impl MovedPoints<'_> {
     }
 }
 
-impl PassedPlaces for MovedPoints<'_> {
-    fn is_passed(&self, session: usize, world: [f64; 3]) -> bool {
-        self.beams[session].look(world) == Visibility::Through
+impl SessionBeams for MovedPoints<'_> {
+    fn evidence(&self, session: usize, world: [f64; 3]) -> SessionEvidence {
+        match self.beams[session].look(world) {
+            Visibility::Through => SessionEvidence::Empty { is_pierced: false },
+            Visibility::Onto => SessionEvidence::Occupied,
+            Visibility::Close | Visibility::Hidden | Visibility::Unseen => {
+                SessionEvidence::Unobserved
+            }
+        }
     }
 }
 

@@ -14,7 +14,7 @@ mod unobserved;
 
 pub use occupancy::{OccupancyBuilder, SessionEvidence, SessionOccupancy};
 pub use shift::{
-    PassedPlaces, ThingMotion, ThingPoints, ThingVoxels, UnknownMotion, find_motions,
+    SessionBeams, ThingMotion, ThingPoints, ThingVoxels, UnknownMotion, find_motions,
 };
 pub use things::{Thing, ThingChange, ThingSettings, things};
 pub use unobserved::{UnobservedRegion, unobserved_regions};

@@ -1,7 +1,7 @@
 //! The motion of one thing: the best of those that were found, its uncertainty, and the others that
 //! explain the points as well.
 
-use super::search::{MotionGuess, PassedPlaces, ThingPair};
+use super::search::{MotionGuess, SessionBeams, ThingPair};
 use super::slide::{SettledMotion, settled};
 use super::surfels::ThingSurfel;
 use geometry::{Point, Pose, Vector};
@@ -13,7 +13,7 @@ const MIN_ON: usize = 25;
 /// Least share of the surfels of the side with fewer ones that must have a partner.
 const MIN_SHARE: f64 = 0.12;
 /// Greatest share of the points that beams of the other session may have passed.
-const MAX_THROUGH: f64 = 0.25;
+const MAX_THROUGH: f64 = 0.1;
 /// Scores that are worse by less than a share of the best one explain the points as well, where
 /// beams contradict them by less than another share of the points.
 const AS_WELL: [f64; 2] = [0.25, 0.03];
@@ -79,14 +79,24 @@ impl UnknownMotion {
 pub(super) fn motion(
     sides: [Vec<ThingSurfel>; 2],
     points: [Vec<Vector>; 2],
-    passed: &dyn PassedPlaces,
+    beams: &dyn SessionBeams,
 ) -> Result<ThingMotion, UnknownMotion> {
     if sides.iter().any(|side| side.len() < MIN_SURFELS) {
         return Err(UnknownMotion::FewPoints);
     }
-    let pair = ThingPair::new(sides, points, passed);
+    let pair = ThingPair::new(sides, points, beams);
     let guesses = pair.guesses();
     let n = pair.n_surfels();
+    if std::env::var("SHIFT_DEBUG").is_ok() {
+        let mut text = format!("pair at {:?} surfels {n:?}\n", pair.middle);
+        for g in &guesses {
+            let at = Point::from(pair.middle);
+            let s = g.motion * at - at;
+            text += &format!("  shift {:.3} {:.3} {:.3} turn {:.2} on {:?} {:.3} through {:?} {:.3} score {:.3}\n", s.x, s.y, s.z, turn(&g.motion).to_degrees(), g.n_on, g.on, pair.n_through(&g.motion), g.through, g.score());
+        }
+        use std::io::Write as _;
+        let _ = std::io::stderr().write_all(text.as_bytes());
+    }
     let is_common = |g: &&MotionGuess| {
         let of_fewer = if n[0] < n[1] { 0 } else { 1 };
         g.n_on.iter().all(|on| *on >= MIN_ON)

@@ -31,8 +31,8 @@ pub struct ThingVoxels {
 
 impl ThingVoxels {
     /// The voxels of those `things` that moved: those that changed and their neighbours, those in
-    /// the thing's bounds where the other session has nothing, and all in its bounds where it
-    /// stands partly where it stood.
+    /// the thing's bounds where the other session has nothing, and all in the bounds of both
+    /// sessions where it stands partly where it stood.
     #[must_use]
     pub fn of(things: &[Thing], sessions: [&SessionOccupancy; 2]) -> Self {
         let mut out = Self::default();
@@ -42,12 +42,13 @@ impl ThingVoxels {
             else {
                 continue;
             };
+            let both = then.shared(&now).grown(EDGE);
             let stays = then.touches(&now);
             let parts = [(then, &thing.gone), (now, &thing.filled)];
             for (k, (bounds, changed)) in parts.into_iter().enumerate() {
                 let [own, other] = [sessions[k], sessions[1 - k]];
                 let is_its = |cell: &OccupancyCell| {
-                    stays
+                    (stays && both.contains(SessionOccupancy::centres(&[*cell])[0]))
                         || around(cell, 1).any(|c| changed.binary_search(&c).is_ok())
                         || !other.has_points_near(cell)
                 };

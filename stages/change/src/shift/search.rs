@@ -4,15 +4,22 @@
 
 use super::align::{MotionEquations, ThingSides, moved, step_motion};
 use super::surfels::{ThingSurfel, thinned};
+use super::votes::steps_by_votes;
+use crate::occupancy::SessionEvidence;
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Cholesky, Matrix6, Translation3, UnitQuaternion};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// What the beams of two sessions passed.
-pub trait PassedPlaces: Sync {
-    /// Whether beams of a session (0 the earlier, 1 the later one) went through a place (world
-    /// frame, metres) and ended far behind it.
-    fn is_passed(&self, session: usize, world: [f64; 3]) -> bool;
+/// What the beams of two sessions show about places.
+pub trait SessionBeams: Sync {
+    /// What the beams of a session (0 the earlier, 1 the later one) show about a place (world
+    /// frame, metres). `Occupied` only where a beam ended at the place.
+    fn evidence(&self, session: usize, world: [f64; 3]) -> SessionEvidence;
+
+    /// Whether beams of a session went through a place and ended far behind it.
+    fn is_passed(&self, session: usize, world: [f64; 3]) -> bool {
+        matches!(self.evidence(session, world), SessionEvidence::Empty { .. })
+    }
 }
 
 /// Surfels of a side for the search and for the result.
@@ -26,9 +33,13 @@ const COARSE: [f64; 6] = [0.25, 0.25, 0.15, 0.1, 0.06, 0.06];
 const FINE: [f64; 9] = [0.05, 0.04, 0.03, 0.03, REACH, REACH, REACH, REACH, REACH];
 /// The last one: two small voxels, as far as beams lie apart.
 pub(super) const REACH: f64 = 0.025;
-/// Starts that are aligned, and motions that are refined.
-const N_STARTS: usize = 40;
-const N_REFINED: usize = 10;
+/// Starts of a turn that are aligned, and motions that are refined.
+const N_STARTS: usize = 12;
+const N_STARTS_OF_MANY: usize = 3;
+const N_REFINED: usize = 12;
+/// Greatest change of a thing's height, metres, that is tried: it stands on the floor, or on a
+/// pallet or step.
+const RAISED: f64 = 0.3;
 /// Turns that are tried of a thing whose faces are not at right angles.
 const N_TURNS: usize = 24;
 /// Share of upright faces at right angles to one another from which on only quarter turns are
@@ -43,7 +54,7 @@ const SAME: [f64; 2] = [0.03, 0.07];
 const STEP: [f64; 2] = [0.05, 0.1];
 /// Weight of points that beams passed beside those that agree: what is not there contradicts more
 /// than agreement confirms.
-const CONTRADICTION: f64 = 2.0;
+const CONTRADICTION: f64 = 4.0;
 
 /// A thing in both sessions.
 pub(super) struct ThingPair<'a> {
@@ -53,7 +64,7 @@ pub(super) struct ThingPair<'a> {
     points: [Vec<Vector>; 2],
     /// Middle of the earlier surfels.
     pub(super) middle: Vector,
-    passed: &'a dyn PassedPlaces,
+    beams: &'a dyn SessionBeams,
 }
 
 /// A motion from the earlier to the later session, and what speaks for it.
@@ -77,7 +88,7 @@ impl<'a> ThingPair<'a> {
     pub(super) fn new(
         sides: [Vec<ThingSurfel>; 2],
         points: [Vec<Vector>; 2],
-        passed: &'a dyn PassedPlaces,
+        beams: &'a dyn SessionBeams,
     ) -> Self {
         let some = |n: usize| sides.each_ref().map(|side| thinned(side, n));
         let middle = mean(&sides[0]);
@@ -86,7 +97,7 @@ impl<'a> ThingPair<'a> {
             fine: ThingSides::new(some(N_FINE), FINE[0]),
             points: points.each_ref().map(|side| thinned(side, N_ASKED)),
             middle,
-            passed,
+            beams,
         }
     }
 
@@ -101,7 +112,7 @@ impl<'a> ThingPair<'a> {
         let back = motion.inverse();
         let n = |k: usize, pose: &Pose| {
             let there = self.points[k].iter().map(|p| (pose * Point::from(*p)).coords);
-            there.filter(|p| self.passed.is_passed(1 - k, (*p).into())).count()
+            there.filter(|p| self.beams.is_passed(1 - k, (*p).into())).count()
         };
         [n(0, motion), n(1, &back)]
     }
@@ -174,37 +185,45 @@ impl<'a> ThingPair<'a> {
         (a * at - b * at).norm() < SAME[0] && a.rotation.angle_to(&b.rotation) < SAME[1]
     }
 
-    /// The starts with most partners.
+    /// For each turn, the starts with most partners.
     fn starts(&self) -> Vec<Pose> {
         let [then, now] = [0, 1].map(|k| &self.coarse.sides[k].all);
         let square = [then, now].map(|side| azimuth(side));
-        let (turns, azimuth): (Vec<f64>, f64) = match square {
+        let (turns, azimuth, n): (Vec<f64>, f64, usize) = match square {
             [Some(then), Some(now)] => {
-                ((0..4).map(|k| now - then + f64::from(k) * FRAC_PI_2).collect(), now)
+                let quarter = |k: i32| now - then + f64::from(k) * FRAC_PI_2;
+                ((0..4).map(quarter).collect(), now, N_STARTS)
             }
-            _ => ((0..N_TURNS).map(|k| TAU * k as f64 / N_TURNS as f64).collect(), 0.0),
+            _ => {
+                let one = |k: usize| TAU * k as f64 / N_TURNS as f64;
+                ((0..N_TURNS).map(one).collect(), 0.0, N_STARTS_OF_MANY)
+            }
         };
-        let mut all: Vec<(usize, Pose)> = Vec::new();
+        let mut out = Vec::new();
         for turn in turns {
-            for start in self.placed(turn, azimuth) {
+            let start = |start: Pose| {
                 let [a, b] = self.coarse.n_on(&start, 2.0 * COARSE[3]);
-                all.push((a + b, start));
-            }
+                (a + b, start)
+            };
+            let mut own: Vec<_> = self.placed(turn, azimuth).into_iter().map(start).collect();
+            own.sort_by_key(|(n, _)| std::cmp::Reverse(*n));
+            out.extend(own.into_iter().take(n).map(|(_, start)| start));
         }
-        all.sort_by_key(|(n, _)| std::cmp::Reverse(*n));
-        all.into_iter().take(N_STARTS).map(|(_, start)| start).collect()
+        out
     }
 
-    /// Starts with one turn: the ends or the middles of both sides lie on one another, along an
-    /// azimuth, across it, and in height.
+    /// Starts with one turn: those for which most pairs of surfels vote, and those at which the
+    /// ends or the middles of both sides lie on one another, along an azimuth and across it.
     fn placed(&self, turn: f64, azimuth: f64) -> Vec<Pose> {
         let turn = UnitQuaternion::from_axis_angle(&Vector::z_axis(), turn);
         let about = Pose::from_parts(Translation3::from(self.middle - turn * self.middle), turn);
         let (sin, cos) = azimuth.sin_cos();
         let axes = [Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0), Vector::z()];
-        let then: Vec<Vector> =
-            self.coarse.sides[0].all.iter().map(|s| moved(s, &about).at).collect();
-        let now: Vec<Vector> = self.coarse.sides[1].all.iter().map(|s| s.at).collect();
+        let then: Vec<ThingSurfel> =
+            self.coarse.sides[0].all.iter().map(|s| moved(s, &about)).collect();
+        let now = &self.coarse.sides[1].all;
+        let mut shifts = steps_by_votes(&then, now, RAISED);
+        let [then, now] = [&then, now].map(|side| side.iter().map(|s| s.at).collect::<Vec<_>>());
         let steps = axes.map(|axis| {
             let ([low, high], [to_low, to_high]) = (ends(&then, &axis), ends(&now, &axis));
             let mut steps = vec![to_high - high];
@@ -215,16 +234,15 @@ impl<'a> ThingPair<'a> {
             }
             steps
         });
-        let mut out = Vec::new();
+        // Tops are seen by most stations; else the thing stands as high as before.
+        let heights = [steps[2][0], 0.0];
+        let heights = &heights[usize::from(heights[0].abs() > RAISED)..];
         for x in &steps[0] {
             for y in &steps[1] {
-                for z in &steps[2] {
-                    let shift = *x * axes[0] + *y * axes[1] + *z * axes[2];
-                    out.push(Translation3::from(shift) * about);
-                }
+                shifts.extend(heights.iter().map(|z| *x * axes[0] + *y * axes[1] + *z * axes[2]));
             }
         }
-        out
+        shifts.into_iter().map(|shift| Translation3::from(shift) * about).collect()
     }
 }
 

@@ -1,8 +1,9 @@
 //! Motions of synthetic things, whose points are cast from stations.
 
 use super::motion::{ThingMotion, UnknownMotion, motion};
-use super::search::PassedPlaces;
+use super::search::SessionBeams;
 use super::surfels::surfels;
+use crate::occupancy::SessionEvidence;
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 
@@ -113,12 +114,17 @@ impl Stage {
 
 struct Both<'a>([&'a Stage; 2]);
 
-impl PassedPlaces for Both<'_> {
-    fn is_passed(&self, session: usize, world: [f64; 3]) -> bool {
+impl SessionBeams for Both<'_> {
+    fn evidence(&self, session: usize, world: [f64; 3]) -> SessionEvidence {
         let place = Vector::from(world);
         let near = |x: f64, y: f64| self.0[session].passes(&(place + Vector::new(x, y, 0.0)));
         // Beams are as wide as the footprint of a look-up.
-        near(0.012, 0.0) && near(-0.012, 0.0) && near(0.0, 0.012) && near(0.0, -0.012)
+        let sides = [[0.012, 0.0], [-0.012, 0.0], [0.0, 0.012], [0.0, -0.012]];
+        if sides.iter().all(|s| near(s[0], s[1])) {
+            SessionEvidence::Empty { is_pierced: false }
+        } else {
+            SessionEvidence::Unobserved
+        }
     }
 }
 

@@ -45,6 +45,11 @@ impl MovableKind {
         }
     }
 
+    /// Share of its sides that there is: of a cart only deck, wheels and handle.
+    pub(super) fn filled(self) -> f64 {
+        if self == Self::Cart { 0.2 } else { 1.0 }
+    }
+
     /// How many turns of a whole turn look the same; `None` if all do.
     #[must_use]
     pub fn n_alike(self) -> Option<usize> {

@@ -27,7 +27,7 @@ const FREE: [f64; 2] = [0.12, 0.6];
 const OFF: [f64; 2] = [0.003, 0.01];
 /// Angle between the beams that tell which sides of a thing are seen, degrees.
 const COARSE: f64 = 0.4;
-/// A side is seen if the beams meet this share of its squares of [`SQUARE`] metres.
+/// A side is seen if the beams meet this share of its squares, as far as there are any, of [`SQUARE`] metres.
 const SEEN: f64 = 0.35;
 const SQUARE: f64 = 0.1;
 /// Number of places that are tried for each object.
@@ -277,7 +277,7 @@ fn sides_seen(scene: &Scene, things: &[TrueThing], k: usize) -> Result<Vec<BTree
     }
     let is_seen = |thing: &TrueThing, squares: &BTreeSet<(usize, i32, i32)>, side: usize| {
         let n = squares.iter().filter(|s| s.0 == side).count() as f64;
-        n >= SEEN * thing.size[1 - side % 2] * thing.size[2] / (SQUARE * SQUARE)
+        n >= SEEN * thing.kind.filled() * thing.size[1 - side % 2] * thing.size[2] / (SQUARE * SQUARE)
     };
     let sides = things.iter().zip(&squares);
     Ok(sides.map(|(t, s)| (0..4).filter(|side| is_seen(t, s, *side)).collect()).collect())
