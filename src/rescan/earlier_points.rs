@@ -181,7 +181,12 @@ impl<'a> EarlierPoints<'a> {
     }
 
     /// Labels of a tile's points, by their places in its mask.
-    pub(super) fn labels(&self, mask: MaskId, places: &[u64], labels: &mut Vec<Label>) -> Result<()> {
+    pub(super) fn labels(
+        &self,
+        mask: MaskId,
+        places: &[u64],
+        labels: &mut Vec<Label>,
+    ) -> Result<()> {
         if !places.is_empty() {
             self.base.compare_mask(mask.0 as usize)?;
         }

@@ -13,8 +13,6 @@ mod things;
 mod unobserved;
 
 pub use occupancy::{OccupancyBuilder, SessionEvidence, SessionOccupancy};
-pub use shift::{
-    SessionBeams, ThingMotion, ThingPoints, ThingVoxels, UnknownMotion, find_motions,
-};
+pub use shift::{SessionBeams, ThingMotion, ThingPoints, ThingVoxels, UnknownMotion, find_motions};
 pub use things::{Thing, ThingChange, ThingSettings, things};
 pub use unobserved::{UnobservedRegion, unobserved_regions};

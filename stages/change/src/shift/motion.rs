@@ -87,31 +87,24 @@ pub(super) fn motion(
     let pair = ThingPair::new(sides, points, beams);
     let guesses = pair.guesses();
     let n = pair.n_surfels();
-    if std::env::var("SHIFT_DEBUG").is_ok() {
-        let mut text = format!("pair at {:?} surfels {n:?}\n", pair.middle);
-        for g in &guesses {
-            let at = Point::from(pair.middle);
-            let s = g.motion * at - at;
-            text += &format!("  shift {:.3} {:.3} {:.3} turn {:.2} on {:?} {:.3} through {:?} {:.3} score {:.3}\n", s.x, s.y, s.z, turn(&g.motion).to_degrees(), g.n_on, g.on, pair.n_through(&g.motion), g.through, g.score());
-        }
-        use std::io::Write as _;
-        let _ = std::io::stderr().write_all(text.as_bytes());
-    }
-    let is_common = |g: &&MotionGuess| {
-        let of_fewer = if n[0] < n[1] { 0 } else { 1 };
+    let of_fewer = if n[0] < n[1] { 0 } else { 1 };
+    let is_common = |g: &MotionGuess| {
         g.n_on.iter().all(|on| *on >= MIN_ON)
             && g.n_on[of_fewer] as f64 >= MIN_SHARE * n[of_fewer] as f64
     };
-    let common: Vec<&MotionGuess> = guesses.iter().filter(is_common).collect();
-    let best = common.first().ok_or(UnknownMotion::NothingCommon)?;
+    let best = guesses.first().ok_or(UnknownMotion::NothingCommon)?;
     if best.through > MAX_THROUGH {
         return Err(UnknownMotion::Contradicted);
     }
+    if !is_common(best) {
+        return Err(UnknownMotion::NothingCommon);
+    }
     let least = (1.0 - AS_WELL[0]) * best.score();
-    let is_as_good =
-        |g: &&&MotionGuess| g.score() >= least && g.through <= best.through + AS_WELL[1];
+    let is_as_good = |g: &&MotionGuess| {
+        is_common(g) && g.score() >= least && g.through <= best.through + AS_WELL[1]
+    };
     let equals: Vec<SettledMotion> =
-        common.iter().filter(is_as_good).map(|g| settled(&pair, g.motion)).collect();
+        guesses.iter().filter(is_as_good).map(|g| settled(&pair, g.motion)).collect();
     // Most things are pushed without being turned about.
     let own = (0..equals.len())
         .min_by(|&a, &b| turn(&equals[a].motion).abs().total_cmp(&turn(&equals[b].motion).abs()));

@@ -167,3 +167,51 @@ impl PointSums {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::occupancy::{OccupancyBuilder, SessionEvidence};
+    use crate::things::{ThingSettings, things};
+    use contract::OneByOne;
+
+    /// A crate whose surfaces have points every 2 cm.
+    fn crate_at(x: f64) -> Vec<[f64; 3]> {
+        let mut out = Vec::new();
+        for (i, j) in (0..=30).flat_map(|i| (0..=30).map(move |j| (i, j))) {
+            let (u, v) = (0.02 * f64::from(i), 0.02 * f64::from(j));
+            out.extend([[x, u, v], [x + 0.6, u, v], [x + u, 0.0, v], [x + u, v, 0.6]]);
+        }
+        out
+    }
+
+    #[test]
+    fn means_are_those_of_the_things_points_in_any_order() {
+        let sessions = [1.0, 4.0].map(|x| {
+            let mut out = OccupancyBuilder::default();
+            let nothing = SessionEvidence::Empty { is_pierced: false };
+            crate_at(x).into_iter().for_each(|p| out.add(p, 4e-4, nothing));
+            out.finish()
+        });
+        let [then, now] = &sessions;
+        let found = things(then, now, &ThingSettings::default(), &OneByOne);
+        assert_eq!(found.len(), 1);
+        let voxels = ThingVoxels::of(&found, [then, now]);
+        assert!(voxels.contains(0, [1.0, 0.3, 0.3]) && !voxels.contains(0, [4.0, 0.3, 0.3]));
+        assert!(voxels.bounds(1)[0].contains([4.3, 0.3, 0.3]));
+        let gathered = |points: &[[f64; 3]]| {
+            let mut out = ThingPoints::default();
+            points.iter().for_each(|p| out.add(&voxels, 0, *p, Some([1.0, -5.0, 0.3])));
+            out
+        };
+        let (all, far) = (crate_at(1.0), [[9.0, 0.0, 0.3]]);
+        let whole = gathered(&[&far, &all[..]].concat());
+        let (mut parts, reversed) = (gathered(&all[900..]), all[..900].iter().rev());
+        parts.join(gathered(&reversed.copied().collect::<Vec<_>>()));
+        assert!(whole == parts, "sums depend on the order");
+        let means = whole.means(0);
+        let front: Vec<_> = means.iter().filter(|(at, _)| at.y < 1e-6).collect();
+        assert!(front.len() >= 30 * 30);
+        assert!(front.into_iter().all(|(at, towards)| at.x > 0.99 && towards.y < -0.9));
+    }
+}

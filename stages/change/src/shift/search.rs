@@ -139,9 +139,11 @@ impl<'a> ThingPair<'a> {
 
     /// Motions that were aligned, the best first.
     pub(super) fn guesses(&self) -> Vec<MotionGuess> {
-        let aligned = self.starts().into_iter().map(|start| self.aligned(&self.coarse, start, &COARSE));
+        let aligned =
+            self.starts().into_iter().map(|start| self.aligned(&self.coarse, start, &COARSE));
         let mut coarse: Vec<MotionGuess> = Vec::new();
-        for motion in aligned {
+        // Upright faces tell nothing of the height, and most things stand as high as before.
+        for motion in aligned.flat_map(|motion| [motion, self.level(motion)]) {
             if !coarse.iter().any(|g| self.is_same(&g.motion, &motion)) {
                 coarse.push(self.judged(motion));
             }
@@ -178,6 +180,12 @@ impl<'a> ThingPair<'a> {
             motion = step_motion(&solved.solve(&equations.right), &about) * motion;
         }
         motion
+    }
+
+    /// A motion whose height is changed so that the middle stays as high as it was.
+    fn level(&self, motion: Pose) -> Pose {
+        let raised = (motion * Point::from(self.middle)).z - self.middle.z;
+        Translation3::new(0.0, 0.0, -raised) * motion
     }
 
     fn is_same(&self, a: &Pose, b: &Pose) -> bool {

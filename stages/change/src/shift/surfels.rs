@@ -42,7 +42,8 @@ impl PlaceGrid {
     /// Numbers of all points in the 27 voxels around a place: all that are nearer than an edge.
     pub(super) fn near(&self, place: &Vector) -> impl Iterator<Item = usize> + '_ {
         let [x, y, z] = cell(place, self.edge);
-        let steps = (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [i, j, k])));
+        let steps =
+            (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [i, j, k])));
         let cells = steps.filter_map(move |[i, j, k]| self.cells.get(&[x + i, y + j, z + k]));
         cells.flatten().map(|i| *i as usize)
     }

@@ -216,5 +216,8 @@ fn sides_that_have_nothing_in_common_tell_nothing() {
     let mut now = stage(is, &[]);
     now.stations.push(Vector::new(2.0, 0.0, 4.0));
     assert_eq!(found(&then, &now), Err(UnknownMotion::NothingCommon));
-    assert_eq!(motion([vec![], vec![]], [vec![], vec![]], &Both([&then, &now])).err(), Some(UnknownMotion::FewPoints));
+    assert_eq!(
+        motion([vec![], vec![]], [vec![], vec![]], &Both([&then, &now])).err(),
+        Some(UnknownMotion::FewPoints)
+    );
 }

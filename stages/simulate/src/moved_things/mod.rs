@@ -277,7 +277,8 @@ fn sides_seen(scene: &Scene, things: &[TrueThing], k: usize) -> Result<Vec<BTree
     }
     let is_seen = |thing: &TrueThing, squares: &BTreeSet<(usize, i32, i32)>, side: usize| {
         let n = squares.iter().filter(|s| s.0 == side).count() as f64;
-        n >= SEEN * thing.kind.filled() * thing.size[1 - side % 2] * thing.size[2] / (SQUARE * SQUARE)
+        n >= SEEN * thing.kind.filled() * thing.size[1 - side % 2] * thing.size[2]
+            / (SQUARE * SQUARE)
     };
     let sides = things.iter().zip(&squares);
     Ok(sides.map(|(t, s)| (0..4).filter(|side| is_seen(t, s, *side)).collect()).collect())
@@ -286,7 +287,8 @@ fn sides_seen(scene: &Scene, things: &[TrueThing], k: usize) -> Result<Vec<BTree
 /// The side of its box that a point of a thing (thing's frame) lies nearest to, and the square on
 /// it; `None` for points farther inside than an eighth of the width: what stands on a deck.
 fn square_of(p: &Point, size: [f64; 3]) -> Option<(usize, i32, i32)> {
-    let depth = [0.5 * size[0] - p.x, 0.5 * size[1] - p.y, 0.5 * size[0] + p.x, 0.5 * size[1] + p.y];
+    let depth =
+        [0.5 * size[0] - p.x, 0.5 * size[1] - p.y, 0.5 * size[0] + p.x, 0.5 * size[1] + p.y];
     let side = (0..4).min_by(|&a, &b| depth[a].total_cmp(&depth[b]))?;
     let along = if side % 2 == 0 { p.y } else { p.x };
     let cell = |v: f64| (v / SQUARE).floor() as i32;
