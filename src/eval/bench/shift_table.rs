@@ -1,10 +1,62 @@
-//! The table of pushed things: errors of their shifts by the number of sides that were seen.
+//! Rows and table of pushed things: errors of their shifts by the number of sides that were seen.
 
-use super::shifts::{ShiftRow, ShiftsRow};
+use geometry::Vector;
+use serde::Serialize;
 use std::fmt::Write as _;
 
 /// An error up to so many standard deviations is expected of nearly all.
 const EXPECTED: f64 = 3.0;
+
+/// Greatest standard deviation in any direction of a shift that counts as determined, metres.
+const DETERMINED: f64 = 0.05;
+
+/// One moved thing, and what was reported of it.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct ShiftRow {
+    pub(super) kind: String,
+    /// Upright sides that each session saw a good part of, and those that both saw.
+    pub(super) sides: [usize; 3],
+    /// Length of the true shift, metres, and true turn, degrees.
+    pub(super) pushed: f64,
+    pub(super) turned: f64,
+    /// Whether it was reported as moved, between these places.
+    pub(super) moved: bool,
+    /// Why no shift is stated, where it is reported as moved.
+    pub(super) unknown: Option<String>,
+    /// Error of the shift of the stated place, metres.
+    pub(super) error: Option<[f64; 3]>,
+    /// Largest standard deviation of the shift in any direction, metres.
+    pub(super) sigma: Option<f64>,
+    /// Largest error over its standard deviation along the main axes of the covariance.
+    pub(super) z: Option<f64>,
+    /// Error of the turn, degrees, and the same over its standard deviation.
+    pub(super) turn_error: Option<f64>,
+    pub(super) turn_z: Option<f64>,
+}
+
+impl ShiftRow {
+    /// Length of the error, metres.
+    pub(super) fn off(&self) -> Option<f64> {
+        self.error.map(|e| Vector::from(e).norm())
+    }
+
+    /// Whether the shift is stated as determined in each direction.
+    pub(super) fn is_determined(&self) -> bool {
+        self.error.is_some() && self.sigma.is_none_or(|sigma| sigma <= DETERMINED)
+    }
+}
+
+/// One case.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(super) struct ShiftsRow {
+    pub(super) seed: u64,
+    pub(super) failed: Option<String>,
+    pub(super) things: Vec<ShiftRow>,
+    /// Bodies that are reported as changed and are none of the things.
+    pub(super) n_invented: usize,
+    /// Seconds of the rescan.
+    pub(super) seconds: f64,
+}
 
 /// The table, and a line for each thing that is off by more than it should be.
 pub(super) fn table(rows: &[ShiftsRow]) -> String {

@@ -3,7 +3,7 @@
 
 use super::cases::{CaseRow, CaseToRun, Cases};
 use super::request::RescanBench;
-use super::shift_table::table;
+use super::shift_table::{ShiftRow, ShiftsRow, table};
 use crate::engine::Engine;
 use crate::eval::virtual_scan::{Formats, scan_scene};
 use crate::job::{Job, Means};
@@ -13,7 +13,6 @@ use contract::{Error, Result};
 use export::atomic;
 use geometry::{Aabb, Point, Pose, Vector};
 use nalgebra::{Matrix3, UnitQuaternion};
-use serde::Serialize;
 use serde_json::Value;
 use simulate::{MovedThings, TrueThing, moved_things};
 use std::f64::consts::TAU;
@@ -23,56 +22,6 @@ use std::path::Path;
 /// Distance of a reported body's middle from a true one's within which it is that one, metres: a
 /// session may see one end of it only.
 const SAME_THING: f64 = 0.6;
-/// Standard deviation of a shift in no stated direction that counts as determined, metres.
-const DETERMINED: f64 = 0.05;
-
-/// One moved thing, and what was reported of it.
-#[derive(Debug, Clone, Default, Serialize)]
-pub(super) struct ShiftRow {
-    pub(super) kind: String,
-    /// Upright sides that each session saw a good part of, and those that both saw.
-    pub(super) sides: [usize; 3],
-    /// Length of the true shift, metres, and true turn, degrees.
-    pub(super) pushed: f64,
-    pub(super) turned: f64,
-    /// Whether it was reported as moved, between these places.
-    pub(super) moved: bool,
-    /// Why no shift is stated, where it is reported as moved.
-    pub(super) unknown: Option<String>,
-    /// Error of the shift of the stated place, metres.
-    pub(super) error: Option<[f64; 3]>,
-    /// Largest standard deviation of the shift in any direction, metres.
-    pub(super) sigma: Option<f64>,
-    /// Largest error over its standard deviation along the main axes of the covariance.
-    pub(super) z: Option<f64>,
-    /// Error of the turn, degrees, and the same over its standard deviation.
-    pub(super) turn_error: Option<f64>,
-    pub(super) turn_z: Option<f64>,
-}
-
-impl ShiftRow {
-    /// Length of the error, metres.
-    pub(super) fn off(&self) -> Option<f64> {
-        self.error.map(|e| Vector::from(e).norm())
-    }
-
-    /// Whether the shift is stated as determined in each direction.
-    pub(super) fn is_determined(&self) -> bool {
-        self.error.is_some() && self.sigma.is_none_or(|sigma| sigma <= DETERMINED)
-    }
-}
-
-/// One case.
-#[derive(Debug, Clone, Default, Serialize)]
-pub(super) struct ShiftsRow {
-    pub(super) seed: u64,
-    pub(super) failed: Option<String>,
-    pub(super) things: Vec<ShiftRow>,
-    /// Bodies that are reported as changed and are none of the things.
-    pub(super) n_invented: usize,
-    /// Seconds of the rescan.
-    pub(super) seconds: f64,
-}
 
 /// Draws halls with pushed things, rescans them, and returns the table.
 pub fn shifts(bench: &RescanBench, means: &Means, engine: &Engine) -> Result<String> {

@@ -17,8 +17,8 @@ const LEAST_SCALE: f64 = 0.0015;
 /// Edge of the cells whose surfels together count as one measurement, metres: errors of
 /// neighbouring beams are alike.
 const TOGETHER: f64 = 0.1;
-/// Standard deviation of a normal, radians (1.5°): along a flat face the pairs seem to determine the
-/// shift only because their normals are noisy.
+/// Standard deviation of a normal, radians (1.5°): along a flat face the pairs seem to determine
+/// the shift only because their normals are noisy.
 const NORMAL: f64 = 0.026;
 /// Tukey's constant, and the standard deviation by the median absolute value.
 const TUKEY: f64 = 4.685;

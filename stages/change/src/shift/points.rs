@@ -89,7 +89,7 @@ fn cells(bounds: &Aabb) -> impl Iterator<Item = OccupancyCell> + use<> {
 /// Number of points of a small voxel, and sums of their positions relative to its corner and of the
 /// directions towards their scanners.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct PointSums {
+struct ThingPointSums {
     n: u32,
     at: [i64; 3],
     towards: [i64; 3],
@@ -99,7 +99,7 @@ struct PointSums {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ThingPoints {
     /// For each thing, the sums by small voxel.
-    of: BTreeMap<u16, FxHashMap<[i32; 3], PointSums>>,
+    of: BTreeMap<u16, FxHashMap<[i32; 3], ThingPointSums>>,
 }
 
 impl ThingPoints {
@@ -119,7 +119,7 @@ impl ThingPoints {
         let beam = scanner.map(|s| Vector::from(s) - Vector::from(world));
         let towards = beam.and_then(|b| b.try_normalize(1e-6)).unwrap_or_default();
         let towards = towards.map(|v| (v / DIRECTION_UNIT).round() as i64);
-        let one = PointSums { n: 1, at: [0, 1, 2].map(at), towards: towards.into() };
+        let one = ThingPointSums { n: 1, at: [0, 1, 2].map(at), towards: towards.into() };
         for thing in things {
             self.of.entry(*thing).or_default().entry(cell).or_default().join(&one);
         }
@@ -140,7 +140,7 @@ impl ThingPoints {
         let Some(all) = number.and_then(|number| self.of.get(&number)) else { return Vec::new() };
         let mut cells: Vec<_> = all.iter().collect();
         cells.sort_unstable_by_key(|(cell, _)| **cell);
-        let mean = |(cell, sums): (&[i32; 3], &PointSums)| {
+        let mean = |(cell, sums): (&[i32; 3], &ThingPointSums)| {
             let one = |i: usize| {
                 f64::from(cell[i]) * EDGE / FINER + sums.at[i] as f64 * UNIT / f64::from(sums.n)
             };
@@ -153,12 +153,12 @@ impl ThingPoints {
     /// Memory that the sums take, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let one = size_of::<([i32; 3], PointSums)>();
+        let one = size_of::<([i32; 3], ThingPointSums)>();
         self.of.values().map(|cells| cells.capacity() * one).sum()
     }
 }
 
-impl PointSums {
+impl ThingPointSums {
     fn join(&mut self, other: &Self) {
         self.n += other.n;
         for i in 0..3 {

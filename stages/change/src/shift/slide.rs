@@ -21,6 +21,8 @@ const PASSED: (f64, f64) = (0.004, 4.0);
 /// a few wide; and the share of the distance of the ends.
 const END: f64 = 0.004;
 const OF_WIDTH: f64 = 0.15;
+/// Standard deviation of a direction of which nothing is known, metres.
+const OPEN: f64 = 1.0;
 /// Rounds of slides and of alignment across them.
 const ROUNDS: usize = 3;
 /// Alignments across the weak directions after each round.
@@ -104,9 +106,6 @@ pub(super) fn settled(pair: &ThingPair<'_>, aligned: Pose) -> SettledMotion {
     }
     SettledMotion { motion, about, covariance }
 }
-
-/// Standard deviation of a direction of which nothing is known, metres.
-const OPEN: f64 = 1.0;
 
 /// RMS distance of the earlier surfels from their middle in the plan, metres.
 fn radius(pair: &ThingPair<'_>) -> f64 {

@@ -27,7 +27,8 @@ const FREE: [f64; 2] = [0.12, 0.6];
 const OFF: [f64; 2] = [0.003, 0.01];
 /// Angle between the beams that tell which sides of a thing are seen, degrees.
 const COARSE: f64 = 0.4;
-/// A side is seen if the beams meet this share of its squares, as far as there are any, of [`SQUARE`] metres.
+/// A side is seen if the beams meet this share of its squares, as far as there are any, of
+/// [`SQUARE`] metres.
 const SEEN: f64 = 0.35;
 const SQUARE: f64 = 0.1;
 /// Number of places that are tried for each object.
