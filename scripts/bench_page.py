@@ -430,6 +430,27 @@ def say_rescans():
     ]
 
 
+def say_shift():
+    rows = [r for r in Family("shift").last() if r["sides"] == "all" and r["build"] == "after"]
+    moved, stated, within = (sum(int(r[k]) for r in rows) for k in ("moved", "stated", "within_3"))
+    return [
+        f"Of {moved} things that are reported as moved the shift of {stated} is stated, and within three "
+        f"deviations for {within}."
+    ]
+
+
+def table_shift():
+    head = ["build (seed)", "sides that each session sees", "things", "moved", "shift stated"]
+    head += ["error, median mm", "90 %", "largest", "within 3 deviations", "turn, median °"]
+    rows = []
+    for r in Family("shift").last():
+        within = f"{r['within_3']} of {r['stated']}" if r["within_3"] else ""
+        errors = [r[f"{k}_mm"] for k in ("median", "most", "largest")]
+        row = [f"{r['build']} ({r['seed']})", r["sides"], r["things"], r["moved"], r["stated"]]
+        rows.append([*row, *errors, within, r["turn_median_deg"]])
+    return table(head, rows)
+
+
 def say_paths():
     rows = Family("paths").last()
     n, free = (sum(int(r[k] or 0) for r in rows) for k in ("colliding", "colliding_called_free"))

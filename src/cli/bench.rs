@@ -14,6 +14,7 @@ use crate::eval::bench::plan::{PlanBench, plans};
 use crate::eval::bench::plant::{PlantBench, plants};
 use crate::eval::bench::request::{DrawnCases, PlantSize, RescanBench, RescanSuite};
 use crate::eval::bench::rescan::rescans;
+use crate::eval::bench::shifts::shifts;
 use crate::eval::bench::throughput::{ThroughputBench, throughput};
 use contract::{Error, Kind, Result};
 
@@ -81,6 +82,7 @@ pub(super) fn bench_rescan(flags: &RescanBenchFlags, common: &Common, say: &Say)
     let table = match bench.suite {
         RescanSuite::Same => rescans(&bench, &means, &engine)?,
         RescanSuite::Frames | RescanSuite::Lines => frames(&bench, &means, &engine)?,
+        RescanSuite::Things => shifts(&bench, &means, &engine)?,
     };
     say.result(&table);
     Ok(exit::OK)

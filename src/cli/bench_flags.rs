@@ -125,8 +125,8 @@ pub(super) struct RescanBenchFlags {
     pub(super) step: f64,
     #[command(flatten)]
     pub(super) kept: KeptFlags,
-    /// Suite: plants in one frame, new scans in random frames, or lines of equal cells in such
-    /// frames
+    /// Suite: plants in one frame, new scans in random frames, lines of equal cells in such frames,
+    /// or halls with pushed things
     #[arg(long, value_enum, value_name = "WHICH", default_value = "same")]
     pub(super) suite: RescanSuite,
     /// Also run on the new scans alone, for comparison

@@ -174,13 +174,19 @@ impl<'a> EarlierPoints<'a> {
         self.store.task(name).of(amount)
     }
 
-    fn scan(&self, tile: &Tile) -> (&Scan, MaskId) {
+    /// The scan of a tile, and its mask.
+    pub(super) fn scan(&self, tile: &Tile) -> (&Scan, MaskId) {
         let scan = &self.scans[tile.at.scan.0 as usize];
         (scan, scan.mask)
     }
 
-    /// Labels of a tile's points.
-    fn labels(&self, mask: MaskId, places: &[u64], labels: &mut Vec<Label>) -> Result<()> {
+    /// Labels of a tile's points, by their places in its mask.
+    pub(super) fn labels(
+        &self,
+        mask: MaskId,
+        places: &[u64],
+        labels: &mut Vec<Label>,
+    ) -> Result<()> {
         if !places.is_empty() {
             self.base.compare_mask(mask.0 as usize)?;
         }

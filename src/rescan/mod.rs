@@ -15,6 +15,7 @@ mod report;
 mod robots;
 mod session;
 mod superseded;
+mod thing_points;
 mod voxel_fates;
 
 pub use frame::Frame;

@@ -196,10 +196,11 @@ impl RescanReport<'_, '_> {
         }
         for (k, thing) in self.found.labels.things.iter().enumerate() {
             let at = thing.now.or(thing.then).map(|b| b.center()).unwrap_or_default();
-            let [dx, dy, dz] = thing.shift.unwrap_or_default();
+            let shift = thing.motion.as_ref().and_then(|m| m.as_ref().ok()).map(|m| m.shift);
+            let by = shift.map_or(",,".into(), |[x, y, z]| format!("{x:.4},{y:.4},{z:.4}"));
             let _ = writeln!(
                 text,
-                "thing,T{},{},{:.3},{:.3},{:.3},{dx:.3},{dy:.3},{dz:.3},,,,",
+                "thing,T{},{},{:.3},{:.3},{:.3},{by},,,,",
                 k + 1,
                 word(thing.change),
                 at.x,

@@ -273,6 +273,7 @@ impl<'a> CellComparison<'a> {
             self.join(appeared, plant, &mut robots, engine)?;
             labels = self.labels(plant.view(), &robots, engine)?;
         }
+        self.find_motions(plant.view(), &robots, &mut labels, engine)?;
         Ok((robots, labels))
     }
 

@@ -24,6 +24,8 @@ pub mod rescan;
 mod score;
 mod shape;
 mod sheet;
+mod shift_table;
+pub mod shifts;
 mod table;
 pub mod throughput;
 mod time_plot;

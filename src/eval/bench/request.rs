@@ -80,6 +80,8 @@ pub enum RescanSuite {
     Frames,
     /// Lines of equal cells with the new scans in random frames.
     Lines,
+    /// Halls without robots in which three things were pushed and turned.
+    Things,
 }
 
 /// Request of the rescan bench.

@@ -6,11 +6,13 @@
 #![forbid(unsafe_code)]
 
 mod occupancy;
+mod shift;
 mod solid;
 mod split;
 mod things;
 mod unobserved;
 
 pub use occupancy::{OccupancyBuilder, SessionEvidence, SessionOccupancy};
+pub use shift::{SessionBeams, ThingMotion, ThingPoints, ThingVoxels, UnknownMotion, find_motions};
 pub use things::{Thing, ThingChange, ThingSettings, things};
 pub use unobserved::{UnobservedRegion, unobserved_regions};

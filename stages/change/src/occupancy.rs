@@ -183,6 +183,11 @@ impl SessionOccupancy {
         self.cells.contains_key(cell) || around(cell, 1).any(|cell| self.cells.contains_key(&cell))
     }
 
+    /// Whether a voxel holds points.
+    pub(crate) fn has_points(&self, cell: &OccupancyCell) -> bool {
+        self.cells.contains_key(cell)
+    }
+
     pub(crate) fn is_solid(&self, cell: &OccupancyCell) -> bool {
         self.cells.get(cell).is_some_and(|c| c.n_points >= MIN_POINTS)
     }

@@ -2,6 +2,7 @@
 //! both.
 
 use crate::occupancy::{EDGE, OccupancyCell, REACH, SessionOccupancy, bounds, connected};
+use crate::shift::motion::{ThingMotion, UnknownMotion};
 use crate::split::split_by_size;
 use contract::Fan;
 use geometry::Aabb;
@@ -76,8 +77,8 @@ pub struct Thing {
     pub then: Option<Aabb>,
     /// Bounds in the later session; world frame, metres.
     pub now: Option<Aabb>,
-    /// Centre of the later bounds minus that of the earlier ones, metres, if the thing moved.
-    pub shift: Option<[f64; 3]>,
+    /// Its motion, if it moved and the motion was asked for ([`crate::find_motions`]).
+    pub motion: Option<Result<ThingMotion, UnknownMotion>>,
     /// Volume of the voxels that changed, m³. They lie on the surface of the thing, as far as it
     /// was seen.
     pub volume: f64,
@@ -269,7 +270,6 @@ pub fn things(
         Thing {
             then: Some(then),
             now: Some(now),
-            shift: Some((now.center() - then.center()).into()),
             ..thing(ThingChange::Moved, was.as_ref(), is.as_ref())
         }
     };
@@ -363,7 +363,7 @@ fn thing(change: ThingChange, was: Option<&ChangePiece>, is: Option<&ChangePiece
     let main = is.or(was);
     let n_points = main.map_or(0, |p| p.n_points);
     let volume = main.map_or(0.0, |p| p.cells.len() as f64 * EDGE.powi(3));
-    Thing { change, then, now, shift: None, volume, n_points, gone, filled }
+    Thing { change, then, now, motion: None, volume, n_points, gone, filled }
 }
 
 /// If a box may be the top of another one of which its session saw no more, the box extended down

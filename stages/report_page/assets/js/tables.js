@@ -234,12 +234,18 @@ function changesSection(scene) {
       cell(`${say(j.now[0], j.slides)} ± ${saySigma(j.now[1], j.slides)}`, "num"),
       cell(say(j.change, j.slides), "num"), cell(bar(limits, j.now[0], j.now[1], j.then[0])));
   });
+  const movedBy = ({ shift, motion, shift_unknown: unknown }) => {
+    if (!shift) return unknown ? `unknown: ${unknown}` : "";
+    if (!motion) return place(shift, 2);
+    const turn = motion.turn_deg === null ? "" : `, turned by ${fixed(motion.turn_deg, 1)}°`;
+    return `${place(shift)} ± ${place(motion.sigma)}${turn}`;
+  };
   const things = changes.things.map((thing, k) => {
     const [low, high] = thing.now || thing.then;
     return el("tr", {}, el("th", { scope: "row" }, `T${k + 1}`), cell(thing.change),
       cell(minus(high, low).map((v) => fixed(v, 2)).join(" × "), "num"),
       cell(place(low.map((v, i) => (v + high[i]) / 2), 2), "num"),
-      cell(thing.shift ? place(thing.shift, 2) : "", "num"));
+      cell(movedBy(thing), "num"));
   });
   const unseen = changes.fixed_not_compared || [];
   const frame = changes.frame
