@@ -16,8 +16,14 @@ use std::time::Instant;
 /// Seed of the cell: any other gives another cell.
 const SEED: u64 = 1;
 
-/// Keeps everything in `out`, or in a temporary folder.
-pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome> {
+/// Keeps everything in `out`, or in a temporary folder. Each scanner sends about `n_beams` beams,
+/// or as many as a crew would take.
+pub fn run(
+    out: Option<&Path>,
+    n_beams: Option<u64>,
+    means: &Means,
+    engine: &Engine,
+) -> Result<Outcome> {
     let temporary = out.is_none().then(tempfile::tempdir).transpose()?;
     let dir: PathBuf = match (out, &temporary) {
         (Some(out), _) => out.to_path_buf(),
@@ -28,7 +34,10 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
     write_robots(&robots)?;
     let started = Instant::now();
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
-    let scene = simulate::demo_scene(SEED, &models)?;
+    let mut scene = simulate::demo_scene(SEED, &models)?;
+    if n_beams.is_some() {
+        scene.scanners.iter_mut().for_each(|scanner| scanner.raster.n_beams = n_beams);
+    }
     atomic::write(&dir.join("scene.toml"), scene.to_toml()?.as_bytes())?;
     let truth = scan_scene(&scene, &models, &dir.join("scans"), Formats::ALL, engine)?;
     let scanned = started.elapsed().as_secs_f64();

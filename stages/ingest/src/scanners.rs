@@ -46,7 +46,7 @@ struct ScannerText {
     point_source_id: Option<u16>,
     /// Name of its scan.
     name: Option<String>,
-    /// Position of the scanner in the world, in the unit of the inputs.
+    /// Position of the scanner in the world, metres.
     position: [f64; 3],
     /// Rotation `world_from_scan`, unit quaternion; no rotation without it.
     quaternion_wxyz: Option<[f64; 4]>,
