@@ -37,8 +37,8 @@ pub(super) enum Command {
     Rescan(RescanFlags),
     /// Verify that the files of a result are unchanged since they were written
     Verify(OutFlags),
-    /// Show the summary of a result again; --html writes a page with the plant in 3D, --junit its
-    /// robots as test cases for a build server
+    /// Print all about a result; --html makes sure that there is a page with the plant in 3D, --junit
+    /// writes its robots as test cases for a build server
     Report(ReportFlags),
     /// Write the points of a result in another format, or its scene for planners and simulators
     Export(ExportFlags),
@@ -289,8 +289,8 @@ pub(super) struct ReportFlags {
     /// Write each robot as a test case to this JUnit file: trusted ones pass
     #[arg(long, value_name = "FILE")]
     pub(super) junit: Option<PathBuf>,
-    /// Write OUT/report.html: the plant in 3D with tables, one file that any browser shows offline;
-    /// a later run into OUT removes it if the result has changed, and reports it
+    /// Write OUT/report.html where the run has not: the plant in 3D with tables, one file that any
+    /// browser shows offline; a later run into OUT replaces it if the result has changed
     #[arg(long)]
     pub(super) html: bool,
     /// Print the data of that page as JSON

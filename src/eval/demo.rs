@@ -7,6 +7,7 @@ use crate::detect::library;
 use crate::engine::Engine;
 use crate::job::{Job, Means, Outcome};
 use crate::plan;
+use crate::result::run_record::{MeasuredRun, RunRecord};
 use contract::{Error, Kind, Result};
 use export::atomic;
 use std::fmt::Write as _;
@@ -46,6 +47,12 @@ pub fn run(
     let started = Instant::now();
     let outcome = plan::run(&job, engine)?;
     let seconds = started.elapsed().as_secs_f64();
+    let run = MeasuredRun {
+        seconds,
+        peak_memory_bytes: peak_memory(),
+        stages: &engine.progress.reports(),
+    };
+    RunRecord::keep(&job.out, &run, means, &outcome)?;
     let agreement = Agreement::of(&job.out, &dir.join("scans/truth"))?;
     let n_points: u64 = truth.scans.iter().map(|s| s.n_points).sum();
     let mut summary = outcome.summary;

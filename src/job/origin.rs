@@ -65,7 +65,9 @@ impl Means {
         let memory = if is_exact { format!("\"{words}\"") } else { self.memory_bytes.to_string() };
         let mut all = vec![("memory", memory), ("threads", self.n_threads.to_string())];
         let scanners = self.scanners.as_ref().map(|path| path.to_string_lossy());
-        all.extend(scanners.map(|path| ("scanners", toml::Value::from(path).to_string())));
+        all.extend(
+            scanners.map(|path| ("scanners", toml::Value::String(path.into_owned()).to_string())),
+        );
         let settings = self.settings.all();
         all.extend(settings.iter().map(|(key, value)| (*key, value.to_string())));
 

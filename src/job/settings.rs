@@ -116,7 +116,7 @@ settings! {
         min_size, min_voxels, min_points, robot_margin,
     }
     export: export::Settings {
-        tiles, tile_edge, max_tiles, fixed_cloud, bodies, copc, compress, waiting_bytes,
+        tiles, tile_edge, max_tiles, fixed_cloud, bodies, copc, compress, page, waiting_bytes,
     }
 }
 

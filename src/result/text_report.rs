@@ -165,15 +165,15 @@ fn add_inputs(text: &mut String, result: &ResultFile) {
 fn add_run(text: &mut String, result: &ResultFile, record: Option<&RunRecord>) {
     heading(text, "How the run went");
     for stage in &result.stages {
-        let what = match stage.name.as_str() {
-            "ingest" => ["inputs", "points"],
-            "cluster" => ["points", "bodies above the floor"],
-            "fit" => ["bodies", "robots"],
-            "label" => ["points", "points that move"],
-            _ => ["in", "out"],
+        let [from, to] = match stage.name.as_str() {
+            "ingest" => ["input", "point"],
+            "cluster" => ["point", "body"],
+            "fit" => ["body", "robot"],
+            "label" => ["point", "moving point"],
+            _ => ["item", "item"],
         };
-        let [n_in, n_out] = [stage.n_in, stage.n_out];
-        line(text, &stage.name, &format!("{n_in} {} -> {n_out} {}", what[0], what[1]));
+        let [from, to] = [count(stage.n_in, from), count(stage.n_out, to)];
+        line(text, &stage.name, &format!("{from} -> {to}"));
     }
     let Some(record) = record else {
         line(
