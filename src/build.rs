@@ -17,10 +17,11 @@ fn main() {
         if path.ends_with("guide") {
             continue;
         }
-        println!("cargo:rerun-if-changed={}", path.display());
         if path.is_dir() {
+            println!("cargo:rerun-if-changed={}", path.display());
             gather(&path, &mut files);
-        } else {
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            println!("cargo:rerun-if-changed={}", path.display());
             files.push(path);
         }
     }

@@ -37,8 +37,8 @@ pub(super) enum Command {
     Rescan(RescanFlags),
     /// Verify that the files of a result are unchanged since they were written
     Verify(OutFlags),
-    /// Print all about a result; --html makes sure that there is a page with the plant in 3D, --junit
-    /// writes its robots as test cases for a build server
+    /// Print all about a result; --html makes sure that there is a page with the plant in 3D,
+    /// --junit writes its robots as test cases for a build server
     Report(ReportFlags),
     /// Write the points of a result in another format, or its scene for planners and simulators
     Export(ExportFlags),

@@ -1,7 +1,6 @@
 //! Flags of the commands about the program itself: settings, schemas, completions and manual pages.
 
-use super::schema::SchemaName;
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
@@ -18,6 +17,29 @@ pub(super) struct ConfigPrintFlags {
     /// Print only settings that differ from their defaults
     #[arg(long)]
     pub(super) changed: bool,
+}
+
+/// A file with a schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum SchemaName {
+    /// result.json of a run
+    Result,
+    /// changes.json of a rescan
+    Changes,
+    /// manifest.json, the list of a result's files
+    Manifest,
+    /// A --scanners file
+    Scanners,
+    /// A --config file
+    Config,
+    /// A --review file
+    Review,
+    /// A --readings file of robots calibrate
+    Readings,
+    /// robot.toml of a model in a robot library
+    Robot,
+    /// A scene file of simulate
+    Scene,
 }
 
 #[derive(Debug, Args)]

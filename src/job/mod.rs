@@ -115,7 +115,13 @@ impl Means {
     /// `Usage` for an unknown key or a value of the wrong kind; `BadInput` for a configuration that
     /// cannot be read.
     pub fn of(given: &FlagValues) -> Result<Self> {
-        let mut means = Self::defaults();
+        let mut means = Self {
+            memory_bytes: MEMORY_BYTES,
+            n_threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            scanners: None,
+            settings: Settings::default(),
+            origins: SettingOrigins::default(),
+        };
         // `--set` and the environment are applied before the file, whose length they may bound, and
         // again after it, since they take precedence.
         means.set_all(given)?;
@@ -132,6 +138,21 @@ impl Means {
             means.origins.note("threads", SettingOrigin::Flag("--threads"));
         }
         means.checked()
+    }
+
+    /// All settings as a configuration file, which `--config` reads; `with_origin` adds where each
+    /// value comes from, and `only_changed` leaves out what is at its default.
+    #[must_use]
+    pub fn as_toml(&self, with_origin: bool, only_changed: bool) -> String {
+        let words = memory_words(self.memory_bytes);
+        let is_exact = memory_bytes(&words).is_ok_and(|bytes| bytes == self.memory_bytes);
+        let memory = if is_exact { format!("\"{words}\"") } else { self.memory_bytes.to_string() };
+        let mut all = vec![("memory", memory), ("threads", self.n_threads.to_string())];
+        let scanners = self.scanners.as_ref().map(|path| path.to_string_lossy().into_owned());
+        all.extend(scanners.map(|path| ("scanners", toml::Value::String(path).to_string())));
+        let settings = self.settings.all();
+        all.extend(settings.iter().map(|(key, value)| (*key, value.to_string())));
+        origin::as_toml(&all, &self.origins, with_origin, only_changed)
     }
 
     /// Memory for points that wait for their tiles, bytes: a quarter of what the program itself

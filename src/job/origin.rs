@@ -1,7 +1,6 @@
 //! Where the value of each setting comes from, and all settings as a configuration file.
 
-use super::settings::present_name;
-use super::{MEMORY_BYTES, Means, Settings, memory_bytes, memory_words};
+use super::settings::{Settings, present_name};
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Write as _};
 use std::path::PathBuf;
@@ -55,62 +54,42 @@ pub(super) fn setting_of_variable(name: &str) -> Option<String> {
     keys.find(|key| key.to_uppercase().replace('.', "_") == wanted)
 }
 
-impl Means {
-    /// All settings as a configuration file, which `--config` reads; `with_origin` adds where each
-    /// value comes from, and `only_changed` leaves out what is at its default.
-    #[must_use]
-    pub fn as_toml(&self, with_origin: bool, only_changed: bool) -> String {
-        let words = memory_words(self.memory_bytes);
-        let is_exact = memory_bytes(&words).is_ok_and(|bytes| bytes == self.memory_bytes);
-        let memory = if is_exact { format!("\"{words}\"") } else { self.memory_bytes.to_string() };
-        let mut all = vec![("memory", memory), ("threads", self.n_threads.to_string())];
-        let scanners = self.scanners.as_ref().map(|path| path.to_string_lossy());
-        all.extend(
-            scanners.map(|path| ("scanners", toml::Value::String(path.into_owned()).to_string())),
-        );
-        let settings = self.settings.all();
-        all.extend(settings.iter().map(|(key, value)| (*key, value.to_string())));
-
-        let (mut text, mut room) = (String::new(), "");
-        for (key, value) in all {
-            let origin = self.origins.of(key);
-            if only_changed && origin.is_none() {
-                continue;
-            }
-            let (of, name) = key.split_once('.').unwrap_or(("", key));
-            if of != room {
-                let _ = writeln!(text, "\n[{of}]");
-                room = of;
-            }
-            let line = format!("{name} = {value}");
-            let origin = origin.map_or_else(|| "default".into(), ToString::to_string);
-            // A line break in the name of a file would end the comment.
-            let origin: String = origin.chars().filter(|c| !c.is_control()).collect();
-            let _ = if with_origin {
-                writeln!(text, "{line:<39} # {origin}")
-            } else {
-                writeln!(text, "{line}")
-            };
+/// Settings with their values as a configuration file; `with_origin` adds where each value comes
+/// from, and `only_changed` leaves out what is at its default.
+pub(super) fn as_toml(
+    settings: &[(&str, String)],
+    origins: &SettingOrigins,
+    with_origin: bool,
+    only_changed: bool,
+) -> String {
+    let (mut text, mut room) = (String::new(), "");
+    for (key, value) in settings {
+        let origin = origins.of(key);
+        if only_changed && origin.is_none() {
+            continue;
         }
-        text
-    }
-
-    /// Memory and threads at their defaults.
-    pub(super) fn defaults() -> Self {
-        Self {
-            memory_bytes: MEMORY_BYTES,
-            n_threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            scanners: None,
-            settings: Settings::default(),
-            origins: SettingOrigins::default(),
+        let (of, name) = key.split_once('.').unwrap_or(("", key));
+        if of != room {
+            let _ = writeln!(text, "{}[{of}]", if text.is_empty() { "" } else { "\n" });
+            room = of;
         }
+        let line = format!("{name} = {value}");
+        let origin = origin.map_or_else(|| "default".into(), ToString::to_string);
+        // A line break in the name of a file would end the comment.
+        let origin: String = origin.chars().filter(|c| !c.is_control()).collect();
+        let _ = if with_origin {
+            writeln!(text, "{line:<39} # {origin}")
+        } else {
+            writeln!(text, "{line}")
+        };
     }
+    text
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::FlagValues;
+    use crate::job::{FlagValues, Means};
 
     #[test]
     fn what_is_printed_reads_back_the_same_and_says_where_it_comes_from() {

@@ -1,5 +1,5 @@
-//! How a run went: times, rates and memory, which differ from run to run. They are kept in the store
-//! beside the result, so that the result itself stays the same bytes.
+//! How a run went: times, rates and memory, which differ from run to run. They are kept in the
+//! store beside the result, so that the result itself stays the same bytes.
 
 use crate::cache::VerifiedFiles;
 use crate::engine::progress::StageReport;
@@ -33,12 +33,12 @@ pub struct RunRecord {
     n_threads: usize,
     /// Messages about pieces of earlier runs that were used again.
     reused: Vec<String>,
-    stages: Vec<StageTime>,
+    stages: Vec<RecordedStage>,
 }
 
 /// Time and work of a stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct StageTime {
+struct RecordedStage {
     name: String,
     seconds: f64,
     n_items: u64,
@@ -66,7 +66,7 @@ impl RunRecord {
         if Self::of_result(out, &result).is_some() {
             return Ok(());
         }
-        let stage = |report: &StageReport| StageTime {
+        let stage = |report: &StageReport| RecordedStage {
             name: report.name.clone(),
             seconds: report.seconds,
             n_items: report.n_items,
