@@ -76,8 +76,7 @@ fn add_robot(text: &mut String, robot: &RobotEntry) {
     let _ =
         writeln!(text, "  {link:<24} {seen:>8} {matched:>8} {violated:>12} {points:>10} {rms:>9}");
     for entry in &robot.evidence {
-        let [seen, matched, violated] =
-            [entry.seen, entry.matched, entry.violated].map(|share| percent(share));
+        let [seen, matched, violated] = [entry.seen, entry.matched, entry.violated].map(percent);
         let (link, points) = (quote::shown(&entry.link), entry.n_points);
         let rms = entry.rms.filter(|_| points > 0);
         let rms = rms.map_or_else(|| "-".into(), |v| format!("{} mm", fixed(v * 1e3, 1)));
