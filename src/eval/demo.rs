@@ -10,12 +10,16 @@ use crate::plan;
 use crate::result::run_record::{MeasuredRun, RunRecord};
 use contract::{Error, Kind, Result};
 use export::atomic;
+use simulate::Scene;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Seed of the cell: any other gives another cell.
 const SEED: u64 = 1;
+
+/// By how much a joint of the cell stands elsewhere at another time, radians (20°).
+const TURN: f64 = 0.349;
 
 /// Keeps everything in `out`, or in a temporary folder. Each scanner sends about `n_beams` beams,
 /// or as many as a crew would take.
@@ -40,6 +44,7 @@ pub fn run(
         scene.scanners.iter_mut().for_each(|scanner| scanner.raster.n_beams = n_beams);
     }
     atomic::write(&dir.join("scene.toml"), scene.to_toml()?.as_bytes())?;
+    atomic::write(&dir.join("scene_later.toml"), later(&scene).to_toml()?.as_bytes())?;
     let truth = scan_scene(&scene, &models, &dir.join("scans"), Formats::ALL, engine)?;
     let scanned = started.elapsed().as_secs_f64();
     let job =
@@ -72,6 +77,16 @@ pub fn run(
         let _ = writeln!(summary, "`stillpoint demo --out DIR` keeps scene, scans and results");
     }
     Ok(Outcome { summary, ..outcome })
+}
+
+/// The cell at another time: other errors of the scanner, and the last robot has turned. It is for
+/// whoever tries a rescan.
+fn later(scene: &Scene) -> Scene {
+    let mut later = Scene { seed: scene.seed + 1, ..scene.clone() };
+    if let Some(turned) = later.robots.last_mut().and_then(|r| r.posture.values_mut().next()) {
+        *turned += TURN;
+    }
+    later
 }
 
 /// Writes the demo's robot library.
