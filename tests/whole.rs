@@ -178,8 +178,8 @@ fn scenes_are_the_same_and_load(dir: &Path, robots: &Path) {
     }
 }
 
-/// The run has made a page of the result, which `report --html` leaves as it is; it holds the result
-/// as it is, and a changed page is refused.
+/// The run has made a page of the result, which `report --html` leaves as it is; it holds the
+/// result as it is, and a changed page is refused.
 fn page_shows_the_result(out: &Path) {
     let report = |flag: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
