@@ -15,7 +15,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use robot::{Mesh, Model, ModelDetails};
 use scene::{
     FixedBox, FloorPatch, FoundHulls, PlantRobot, PlantScene, SceneFile, SceneFiles, TouchingBoxes,
-    read_stl, voxel_boxes,
+    voxel_boxes,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -260,7 +260,7 @@ fn is_of_the_library(
         let Some((path, n_bytes)) = file else { continue };
         let is_same = files.has(&path) && {
             let bytes = files.bytes(&path)?;
-            bytes.len() as u64 == n_bytes && bytes == scene::stl(&link.mesh, 1.0)
+            bytes.len() as u64 == n_bytes && bytes == link.mesh.to_stl()
         };
         if !is_same {
             return bad("other meshes");
@@ -281,7 +281,7 @@ fn hanging(id: &str, model: &Model, files: &VerifiedFiles) -> Result<BTreeMap<us
             format!("robots/{id}/meshes/{l:02}_{link}_hanging_{k}.stl")
         };
         for path in (0..).map(name).take_while(|path| files.has(path)) {
-            let mesh = read_stl(&files.bytes(&path)?).ok_or_else(|| {
+            let mesh = Mesh::from_stl(&files.bytes(&path)?).ok_or_else(|| {
                 Error::bad_input("the mesh of an attached thing is no whole binary STL")
                     .at(path.as_str())
                     .hint("run the same job again")

@@ -28,7 +28,7 @@ const BOLTED: u32 = 500;
 const BOLTED_COST: u64 = 4;
 /// Way along the body over which the cost grows by its value at the robot where the cut near the
 /// robot is asked for, hundredths of a voxel's edge (10 cm), and up to which it grows (40 cm).
-const DOUBLE: u32 = 500;
+const DOUBLE: u32 = 1500;
 const GROWS: u32 = 2000;
 /// All costs are multiplied by this, so that the factors act on whole numbers.
 const SCALE: u64 = 16;
@@ -55,10 +55,12 @@ pub(crate) struct Body<'a> {
     pub(crate) graph: &'a Graph,
     /// For each of its voxels, the way along the body from the robot, hundredths of a voxel's edge.
     pub(crate) length: Vec<u32>,
-    /// Whether that way begins at a hand, which may carry a tool.
-    pub(crate) from_hand: Vec<bool>,
+    /// The way from a hand, which may carry a tool, where no other link is much nearer.
+    pub(crate) from_hand: Vec<Option<u32>>,
     /// Way along the longest tool of the robot, hundredths of a voxel's edge.
     pub(crate) longest_tool: u32,
+    /// Largest circumference of a thin part, metres.
+    pub(crate) thin: f64,
     pub(crate) contact: Vec<TouchesRobot>,
     pub(crate) is_fixed: Vec<bool>,
     pub(crate) shape: Vec<LocalShape>,
@@ -78,7 +80,7 @@ impl Body<'_> {
             }
             if self.shape[k] == LocalShape::Flat && preference == Preference::NearRobot {
                 network.add(k, sink, SCALE * FLAT_COST);
-            } else if self.from_hand[k] && self.length[k] <= BOLTED {
+            } else if self.from_hand[k].is_some_and(|length| length <= BOLTED) {
                 network.add(source, k, SCALE * BOLTED_COST);
             }
             if self.is_fixed[k] {
@@ -100,8 +102,8 @@ impl Body<'_> {
         let shared = [100, 141].iter().position(|length| step == *length).unwrap_or(2);
         let length = self.length[a].min(self.length[b]);
         let mut factor = SCALE;
-        if self.from_hand[a] && self.from_hand[b] {
-            let mounted = u64::from(MOUNT.saturating_sub(length)) * (MOUNT_FACTOR - 1) * SCALE;
+        if let (Some(a), Some(b)) = (self.from_hand[a], self.from_hand[b]) {
+            let mounted = u64::from(MOUNT.saturating_sub(a.min(b))) * (MOUNT_FACTOR - 1) * SCALE;
             factor += mounted / u64::from(MOUNT);
         }
         // A hose is as long as it is: nothing along it is nearer to the robot.

@@ -18,6 +18,9 @@ pub struct Attach {
     moving: Vec<Vec<bool>>,
     /// For each fit and each of its links: whether it may carry a tool or a part.
     hands: Vec<Vec<bool>>,
+    /// For each fit and each of its links: whether it is such a link or the one that turns it. Of a
+    /// small flange behind a tool no scan sees anything.
+    wrists: Vec<Vec<bool>>,
     /// For each fit the way along its longest tool, hundredths of a voxel's edge.
     tools: Vec<u32>,
     settings: Settings,
@@ -43,6 +46,9 @@ const LEAST_TOOL: f64 = 0.3;
 /// which only hoses and legs are parts of what moves with a hand.
 const FAR_TOOLS: u32 = 3;
 const LEAST_FAR: u32 = 7500;
+/// How much farther than the nearest link a hand may be from a voxel that may belong to its tool,
+/// hundredths of a voxel's edge (10 cm).
+const BESIDE_HAND: u32 = 500;
 /// Fewer fixed voxels than this, and less than one in so many of a component, are mixed pixels:
 /// they hang between the robot and what is behind it.
 const MIN_FIXED: usize = 3;
@@ -63,16 +69,25 @@ impl Attach {
             Some(model) if fit.gives_labels() => hands(model),
             _ => Vec::new(),
         });
+        let wrists = fits.iter().map(|fit| match models.get(fit.model) {
+            Some(model) if fit.gives_labels() => wrists(model),
+            _ => Vec::new(),
+        });
         let tools = fits.iter().map(|fit| {
             let reach = models.get(fit.model).map_or(0.0, Model::reach);
             (100.0 * (LONGEST_TOOL * reach).max(LEAST_TOOL) / RESIDUAL_EDGE) as u32
         });
-        Self { moving: moving.collect(), hands: hands.collect(), tools: tools.collect(), settings }
+        Self {
+            moving: moving.collect(),
+            hands: hands.collect(),
+            wrists: wrists.collect(),
+            tools: tools.collect(),
+            settings,
+        }
     }
 
     fn is_moving(&self, at: LinkAt) -> bool {
-        self.moving.get(usize::from(at.robot)).and_then(|links| links.get(usize::from(at.link)))
-            == Some(&true)
+        is_among(&self.moving, at)
     }
 
     /// Labels one component that touches a robot. `members` are indices into `voxels`, which are
@@ -151,8 +166,9 @@ impl Attach {
         let is_fixed = (0..members.len()).map(is_fixed).collect();
         share(&Body {
             graph,
-            from_hand: members.iter().map(|at| self.is_hand(paths[*at].1)).collect(),
+            from_hand: self.from_hand(graph, voxels, members, &length),
             longest_tool,
+            thin: self.settings.thin,
             contact: members.iter().map(contact).collect(),
             is_fixed,
             shape,
@@ -160,15 +176,31 @@ impl Attach {
         })
     }
 
+    /// For each voxel of a component the way from a hand, where that is about as near as the
+    /// nearest link: hoses along the wrist lead to a tool as well.
+    fn from_hand(
+        &self,
+        graph: &Graph,
+        voxels: &[ResidualVoxel],
+        members: &[usize],
+        length: &[u32],
+    ) -> Vec<Option<u32>> {
+        let touches_hand = |at: &usize| {
+            self.in_contact(&voxels[*at]) && is_among(&self.wrists, voxels[*at].nearest)
+        };
+        let seeds: Vec<(usize, u32)> =
+            (0..members.len()).filter(|k| touches_hand(&members[*k])).map(|k| (k, 0)).collect();
+        let mut paths = vec![(u32::MAX, 0); members.len()];
+        graph.shortest_paths(&seeds, &mut paths);
+        let is_near = |(path, length): (&(u32, u32), &u32)| {
+            (path.0 <= length.saturating_add(BESIDE_HAND)).then_some(path.0)
+        };
+        paths.iter().zip(length).map(is_near).collect()
+    }
+
     /// Whether a voxel touches a link that moves.
     fn in_contact(&self, voxel: &ResidualVoxel) -> bool {
         voxel.distance <= self.settings.contact && self.is_moving(voxel.nearest)
-    }
-
-    /// Whether the link of a mark may carry a tool or a part.
-    fn is_hand(&self, mark: u32) -> bool {
-        let hands = self.hands.get((mark >> 16) as usize);
-        hands.and_then(|hands| hands.get((mark & 0xffff) as usize)) == Some(&true)
     }
 
     /// Whether a voxel shows that its body is fixed: it stands on the floor, continues outside of
@@ -223,7 +255,7 @@ impl Fold for Attach {
             components: &components,
             links: &links,
             is_fixed: &|voxel| self.is_fixed(voxel),
-            is_hand: &|link| self.is_hand(mark(link)),
+            is_hand: &|link| is_among(&self.hands, link),
         };
         floating::attach(&bodies, &mut decided);
         let labelled = residual.iter().zip(&decided.labels);
@@ -257,6 +289,22 @@ fn hands(model: &Model) -> Vec<bool> {
         carries[joint.parent] |= carries[joint.child] || turns;
     }
     moving.iter().zip(carries).map(|(moving, carries)| *moving && !carries).collect()
+}
+
+/// The links of [`hands`], and the link to which the first of them is joined.
+fn wrists(model: &Model) -> Vec<bool> {
+    let hands = hands(model);
+    let mut wrists = hands.clone();
+    for joint in model.joints.iter().filter(|joint| hands[joint.child]) {
+        wrists[joint.parent] = true;
+    }
+    wrists
+}
+
+/// Whether a link is among those that are true in these lists, by robot.
+fn is_among(links: &[Vec<bool>], at: LinkAt) -> bool {
+    links.get(usize::from(at.robot)).and_then(|links| links.get(usize::from(at.link)))
+        == Some(&true)
 }
 
 /// The link of the mark that occurs most often, the smaller of equals; `None` without marks.

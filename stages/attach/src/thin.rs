@@ -13,6 +13,18 @@ const BEGINS: u32 = 400;
 /// Least length of a hose, hundredths of a voxel's edge (35 cm): longer than the fingers of a
 /// gripper with a slender part between them.
 const MIN_HOSE: u32 = 1750;
+/// Way from the robot within which a longer hose begins, hundredths of a voxel's edge (20 cm), and
+/// the least length of such a one (60 cm).
+const BEGINS_LATE: u32 = 1000;
+const MIN_LATE_HOSE: u32 = 3000;
+/// Way along such a part to where its direction is measured, hundredths of a voxel's edge: from its
+/// first 4 cm to what is 10 to 14 cm on.
+const BEGIN: u32 = 200;
+const NEXT: std::ops::Range<u32> = 500..700;
+/// Least distance between these, voxels: half of the least way.
+const MIN_ALONG: f64 = 2.5;
+/// Least cosine of the angle between the sides of something straight (37°).
+const STRAIGHT: f64 = 0.8;
 /// Least number of voxels within [`AROUND`] of one on a flat surface: two thirds of a disc.
 const MIN_FLAT: usize = 35;
 /// Largest standard deviation of a flat surface from its plane, voxels: it may cross a layer.
@@ -57,6 +69,7 @@ pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<LocalShape
     for k in reached(graph, beginnings, &mut is_left) {
         is_hose[k] = is_thin[k];
     }
+    mark_late_hoses(graph, length, &mut is_left, &mut is_hose);
     for first in 0..n {
         if is_hose[first] {
             let part = reached(graph, vec![first], &mut is_hose);
@@ -67,6 +80,85 @@ pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<LocalShape
         }
     }
     shapes
+}
+
+/// A long thin part that begins not far from the robot.
+struct LatePart {
+    voxels: Vec<usize>,
+    /// Where it begins, and the way from there along its first stretch, voxels.
+    begin: [f64; 3],
+    along: [f64; 3],
+}
+
+impl LatePart {
+    /// `None` where a thin part is too short or begins too far from the robot.
+    fn of(graph: &Graph, length: &[u32], voxels: Vec<usize>) -> Option<Self> {
+        let ways = || voxels.iter().map(|k| length[*k]);
+        let (begins, ends) = (ways().min()?, ways().max()?);
+        if begins > BEGINS_LATE || ends - begins < MIN_LATE_HOSE {
+            return None;
+        }
+        let mean = |range: std::ops::Range<u32>| {
+            let (mut sum, mut n) = ([0.0; 3], 0.0);
+            for k in voxels.iter().filter(|k| range.contains(&(length[**k] - begins))) {
+                let at = graph.voxel(*k).map(f64::from);
+                (0..3).for_each(|i| sum[i] += at[i]);
+                n += 1.0;
+            }
+            sum.map(|v| v / n)
+        };
+        let (begin, next) = (mean(0..BEGIN), mean(NEXT));
+        let along: [f64; 3] = std::array::from_fn(|i| next[i] - begin[i]);
+        // What leads away to both sides is on average where it begins.
+        let is_one_way = along.iter().map(|v| v * v).sum::<f64>() >= MIN_ALONG * MIN_ALONG;
+        is_one_way.then_some(Self { voxels, begin, along })
+    }
+
+    /// Whether this and another part are the two sides of something straight that passes.
+    fn continues(&self, other: &Self) -> bool {
+        let apart: [f64; 3] = std::array::from_fn(|i| self.begin[i] - other.begin[i]);
+        let cosine = |a: &[f64; 3], b: &[f64; 3]| {
+            let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+            dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
+        };
+        cosine(&self.along, &other.along) < -STRAIGHT && cosine(&self.along, &apart) > STRAIGHT
+    }
+}
+
+/// Marks long thin parts that begin not far from the robot, where several hoses lie side by side.
+/// Such a part leads away from the robot; a pipe that passes leads away to both sides.
+fn mark_late_hoses(graph: &Graph, length: &[u32], is_left: &mut [bool], is_hose: &mut [bool]) {
+    let mut parts = Vec::new();
+    for first in 0..is_left.len() {
+        if is_left[first] {
+            let voxels = reached(graph, vec![first], is_left);
+            parts.extend(LatePart::of(graph, length, voxels));
+        }
+    }
+    for part in parts.iter().filter(|part| !parts.iter().any(|other| part.continues(other))) {
+        let begins = part.voxels.iter().map(|k| length[*k]).min();
+        for &k in &part.voxels {
+            is_hose[k] = true;
+            if Some(length[k]) == begins {
+                mark_way_back(graph, length, k, is_hose);
+            }
+        }
+    }
+}
+
+/// Marks the shortest way from a voxel back to the robot.
+fn mark_way_back(graph: &Graph, length: &[u32], from: usize, is_hose: &mut [bool]) {
+    let mut at = from;
+    while length[at] > 0 {
+        let Some((next, _)) = graph.neighbours(at).min_by_key(|(k, _)| (length[*k], *k)) else {
+            return;
+        };
+        if length[next] >= length[at] {
+            return;
+        }
+        is_hose[next] = true;
+        at = next;
+    }
 }
 
 /// The voxels that are reached from some of them, with these, through those that are left; they are

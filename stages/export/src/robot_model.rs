@@ -9,7 +9,7 @@
 
 use crate::atomic;
 use contract::{Fit, JointFit, Result, quote};
-use geometry::{Pose, roll_pitch_yaw};
+use geometry::{Pose, STL_HEAD, STL_TRIANGLE, roll_pitch_yaw};
 use robot::{Joint, JointKind, Mesh, Model, Motion};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -39,7 +39,7 @@ pub fn write_robot(
         bodies.extend(pieces.map(|(k, mesh)| (format!("{}_hanging_{k}", names[l]), mesh)));
         let _ = writeln!(links, "  <link name=\"{}\">", quote::xml(&link.name));
         for (name, mesh) in bodies {
-            atomic::write(&dir.join(format!("meshes/{name}.stl")), &stl(mesh))?;
+            atomic::write(&dir.join(format!("meshes/{name}.stl")), &mesh.to_stl())?;
             for kind in ["visual", "collision"] {
                 let _ = writeln!(
                     links,
@@ -65,15 +65,12 @@ pub fn write_robot(
 #[must_use]
 pub fn mesh_files(id: &str, model: &Model) -> Vec<Option<(String, u64)>> {
     let of_link = |(link, name): (&robot::Link, String)| {
-        let n = link.mesh.triangles.len() as u64;
-        (n > 0).then(|| (format!("robots/{id}/meshes/{name}.stl"), STL_HEAD + STL_TRIANGLE * n))
+        let n = link.mesh.triangles.len();
+        let n_bytes = (STL_HEAD + STL_TRIANGLE * n) as u64;
+        (n > 0).then(|| (format!("robots/{id}/meshes/{name}.stl"), n_bytes))
     };
     model.links.iter().zip(file_names(model)).map(of_link).collect()
 }
-
-/// Length of the head of an STL file, bytes.
-pub(crate) const STL_HEAD: u64 = 84;
-pub(crate) const STL_TRIANGLE: u64 = 50;
 
 /// A unique name for the files of each link, valid on every file system.
 fn file_names(model: &Model) -> Vec<String> {
@@ -175,24 +172,4 @@ fn csv(fit: &Fit, model: &Model) -> String {
         let _ = writeln!(text, "{name},{value:.9},{unit},{is_determined},{limits},{word}");
     }
     text
-}
-
-/// A mesh as binary STL.
-fn stl(mesh: &Mesh) -> Vec<u8> {
-    let mut out = vec![0_u8; 80];
-    out.extend((mesh.triangles.len() as u32).to_le_bytes());
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| mesh.vertices[i as usize]);
-        let (u, v): ([f32; 3], [f32; 3]) =
-            (std::array::from_fn(|i| b[i] - a[i]), std::array::from_fn(|i| c[i] - a[i]));
-        let n: [f32; 3] = std::array::from_fn(|i| {
-            u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]
-        });
-        let length = n.iter().map(|x| x * x).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
-        for value in n.map(|x| x / length).into_iter().chain(a).chain(b).chain(c) {
-            out.extend(value.to_le_bytes());
-        }
-        out.extend([0, 0]);
-    }
-    out
 }

@@ -40,6 +40,7 @@ mod pose;
 pub mod probe;
 pub mod robust;
 mod spread;
+mod stl;
 
 pub use aabb::Aabb;
 pub use depth::DepthImage;
@@ -49,3 +50,4 @@ pub use field::NearestField;
 pub use plane::{Moments, Plane};
 pub use pose::{Point, Pose, Vector, roll_pitch_yaw};
 pub use probe::{Probe, SurfaceSamples};
+pub use stl::{STL_HEAD, STL_TRIANGLE, binary_stl, stl_corners};

@@ -19,7 +19,6 @@ mod plant_scene;
 mod robodk;
 mod sdf;
 mod signed_distance;
-mod stl;
 mod text;
 mod touching;
 mod urdf;
@@ -35,7 +34,6 @@ pub use plant_scene::{FixedBox, FloorPatch, PlantRobot, PlantScene, TouchingBoxe
 pub use robodk::robodk;
 pub use sdf::sdf;
 pub use signed_distance::signed_distances;
-pub use stl::{read_stl, stl};
 pub use touching::FoundHulls;
 pub use urdf::urdf;
 pub use usd::usd;

@@ -6,7 +6,6 @@ use crate::link_pairs::link_pairs;
 use crate::names::{NameMap, NameRule};
 use crate::output::{RobotToWrite, SceneFiles, body_color, fixed_color, names_table};
 use crate::plant_scene::{FLOOR_DEPTH, FixedGroup, LinkBody, PlantScene};
-use crate::stl::stl;
 use crate::text::{XmlText, num, nums};
 use contract::{Error, Kind, Result, quote};
 use geometry::Pose;
@@ -50,7 +49,7 @@ pub fn mjcf(scene: &PlantScene) -> Result<SceneFiles> {
     out.add("plant.xml", xml.finish());
     for own in &robots {
         for piece in (0..own.robot.model.links.len()).flat_map(|link| pieces(own, link)) {
-            out.add(format!("meshes/{}.stl", piece.name), stl(&piece.mesh, 1.0));
+            out.add(format!("meshes/{}.stl", piece.name), piece.mesh.to_stl());
         }
         out.note_robot(own.robot, &own.rules);
     }

@@ -4,7 +4,6 @@ use crate::joint_rules::{JointRule, JointRules};
 use crate::names::{NameMap, NameRule, Named};
 use crate::physics::{FIXED, HANGING, TOUCHING};
 use crate::plant_scene::{PlantRobot, PlantScene};
-use crate::stl::stl;
 use contract::quote;
 use robot::Motion;
 use std::fmt::Write as _;
@@ -40,7 +39,7 @@ impl SceneFiles {
     pub(crate) fn add_meshes(&mut self, folder: &str, robot: &PlantRobot) {
         for link in 0..robot.model.links.len() {
             for body in robot.bodies(link) {
-                self.add(format!("{folder}/{}.stl", body.name), stl(body.mesh, 1.0));
+                self.add(format!("{folder}/{}.stl", body.name), body.mesh.to_stl());
             }
         }
     }

@@ -12,7 +12,6 @@ use crate::output::{RobotToWrite, SceneFile, SceneFiles, names_by_robot, names_t
 use crate::plant_scene::{
     FLOOR_DEPTH, FixedBox, FixedGroup, PlantRobot, PlantScene, box_mesh, slides,
 };
-use crate::stl::stl;
 use crate::text::{num, nums};
 use contract::{Result, quote};
 use geometry::{Pose, Vector, roll_pitch_yaw};
@@ -117,7 +116,7 @@ fn links(robot: &PlantRobot, text: &mut String) {
 fn fixed(scene: &PlantScene, text: &mut String, out: &mut SceneFiles) {
     for FixedGroup { name, boxes, .. } in scene.fixed_groups() {
         let about = Vector::from(boxes[0].center);
-        out.add(format!("meshes/{name}.stl"), stl(&box_mesh(boxes, &about), 1.0));
+        out.add(format!("meshes/{name}.stl"), box_mesh(boxes, &about).to_stl());
         let place = pose(&Pose::from(about));
         let _ = writeln!(text, "    (\"{name}\", \"meshes/{name}.stl\", {place}),");
     }
@@ -125,7 +124,7 @@ fn fixed(scene: &PlantScene, text: &mut String, out: &mut SceneFiles) {
         let size = [floor.size[0], floor.size[1], FLOOR_DEPTH];
         let below = [0.0, 0.0, -size[2] / 2.0];
         let own = FixedBox { center: below, size };
-        out.add("meshes/floor.stl", stl(&box_mesh(&[own], &Vector::zeros()), 1.0));
+        out.add("meshes/floor.stl", box_mesh(&[own], &Vector::zeros()).to_stl());
         let place = pose(&floor.world_from_floor);
         let _ = writeln!(text, "    (\"floor\", \"meshes/floor.stl\", {place}),");
     }

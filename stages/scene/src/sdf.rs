@@ -7,7 +7,6 @@ use crate::output::{
     RobotToWrite, SceneFile, SceneFiles, body_color, fixed_color, names_by_robot, names_table,
 };
 use crate::plant_scene::{FLOOR_DEPTH, FixedGroup, PlantScene, box_mesh, slides};
-use crate::stl::stl;
 use crate::text::{XmlText, num, nums};
 use contract::{Result, quote};
 use geometry::{Pose, Vector};
@@ -102,7 +101,7 @@ fn fixed(scene: &PlantScene, xml: &mut XmlText, out: &mut SceneFiles) {
     for FixedGroup { name, boxes, links } in scene.fixed_groups() {
         let about = Vector::from(boxes[0].center);
         let file = format!("meshes/{name}.stl");
-        out.add(&*file, stl(&box_mesh(boxes, &about), 1.0));
+        out.add(&*file, box_mesh(boxes, &about).to_stl());
         xml.open("model", &[("name", &name)]);
         xml.value("static", &[], "true");
         pose(xml, &Pose::from(about), None);

@@ -8,23 +8,7 @@ use std::io::Write as _;
 /// A mesh as binary STL, metres, single precision.
 #[must_use]
 pub fn surface_stl(mesh: &SurfaceMesh) -> Vec<u8> {
-    let mut out = vec![0_u8; 80];
-    out.reserve(4 + 50 * mesh.triangles.len());
-    out.extend((mesh.triangles.len() as u32).to_le_bytes());
-    for triangle in &mesh.triangles {
-        let [a, b, c] = mesh.corners(*triangle);
-        let (u, v): ([f64; 3], [f64; 3]) =
-            (std::array::from_fn(|i| b[i] - a[i]), std::array::from_fn(|i| c[i] - a[i]));
-        let n: [f64; 3] = std::array::from_fn(|i| {
-            u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]
-        });
-        let length = n.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-        for value in n.map(|x| x / length).into_iter().chain(a).chain(b).chain(c) {
-            out.extend((value as f32).to_le_bytes());
-        }
-        out.extend([0, 0]);
-    }
-    out
+    geometry::binary_stl(mesh.triangles.iter().map(|triangle| mesh.corners(*triangle)))
 }
 
 /// A mesh as binary PLY, metres, double precision.

@@ -120,7 +120,7 @@ impl Design {
         }
         for part in self.parts.iter().chain(self.sub_chains.iter().flat_map(|s| &s.parts)) {
             if let Some(body) = &part.body {
-                put(&mesh_path(part.name), stl(part.name, body));
+                put(&mesh_path(part.name), body.to_stl());
             }
         }
         out
@@ -203,24 +203,4 @@ fn urdf(name: &str, root: Option<&str>, parts: &[DesignPart], hinges: &[Hinge]) 
     }
     t.push_str("</robot>\n");
     t
-}
-
-/// A binary STL, metres.
-fn stl(name: &str, body: &Solid) -> Vec<u8> {
-    let mut out = vec![0_u8; 80];
-    let title = format!("stillpoint demo robot, {name}");
-    let n = title.len().min(80);
-    out[..n].copy_from_slice(&title.as_bytes()[..n]);
-    out.extend((body.triangles.len() as u32).to_le_bytes());
-    for t in &body.triangles {
-        let [a, b, c] = t.map(|i| body.vertices[i as usize]);
-        let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
-        for v in [normal, a.coords, b.coords, c.coords] {
-            for k in 0..3 {
-                out.extend((v[k] as f32).to_le_bytes());
-            }
-        }
-        out.extend([0, 0]);
-    }
-    out
 }

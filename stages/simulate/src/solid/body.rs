@@ -14,6 +14,13 @@ pub struct Solid {
 }
 
 impl Solid {
+    /// The body as binary STL, metres.
+    #[must_use]
+    pub fn to_stl(&self) -> Vec<u8> {
+        let corner = |i: u32| self.vertices[i as usize].coords.into();
+        geometry::binary_stl(self.triangles.iter().map(|triangle| triangle.map(corner)))
+    }
+
     /// Several bodies as one.
     #[must_use]
     pub fn of(parts: impl IntoIterator<Item = Solid>) -> Self {

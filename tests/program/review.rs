@@ -1,9 +1,7 @@
 //! What a person says of a robot, from outside: a posture near which it stands, one at which it
 //! does not, that nothing stands there, and what cannot be.
 
-mod common;
-
-use common::palletiser;
+use crate::common::palletiser;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -2,8 +2,6 @@
 //! without noise and the source's method are right in them, and what is written can be read.
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
-mod common;
-
 use std::path::Path;
 use std::process::Command;
 
@@ -175,7 +173,7 @@ fn copy_real(names: &[&str], robots: &Path) -> bool {
             eprintln!("skipped: no {name} in {}", real.display());
             return false;
         }
-        common::copy_folder(&real.join(name), &robots.join(name));
+        crate::common::copy_folder(&real.join(name), &robots.join(name));
     }
     true
 }

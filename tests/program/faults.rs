@@ -4,9 +4,7 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
-mod common;
-
-use common::palletiser;
+use crate::common::palletiser;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -75,7 +73,7 @@ fn whatever_fails_to_be_written_the_state_is_old_or_new() {
         run.env("FAULT_COUNT", dir.join("count")).output().expect("the program starts")
     };
     assert!(command(dir, "old", &old).status().expect("starts").success());
-    common::copy_folder(&dir.join("old"), &dir.join("new"));
+    crate::common::copy_folder(&dir.join("old"), &dir.join("new"));
     assert!(with("new", &[], 0).status.success());
     let n: usize =
         std::fs::read_to_string(dir.join("count")).expect("a count").parse().expect("it");
@@ -86,7 +84,7 @@ fn whatever_fails_to_be_written_the_state_is_old_or_new() {
     faults.extend(n + 1 - LAST_FAULTS..=n);
     for at in faults {
         let _ = std::fs::remove_dir_all(dir.join("out"));
-        common::copy_folder(&dir.join("old"), &dir.join("out"));
+        crate::common::copy_folder(&dir.join("old"), &dir.join("out"));
         let failed = with("out", &[], at);
         // A sync of a folder or a hint to the system may be passed over; a signal or a panic may
         // not.

@@ -1,9 +1,7 @@
 //! A path of a robot against what was scanned, from outside: into the floor, through what nobody
 //! has seen, and what is no path.
 
-mod common;
-
-use common::palletiser;
+use crate::common::palletiser;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};

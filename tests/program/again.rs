@@ -1,9 +1,7 @@
 //! Runs that come again, from outside: what is there is used, what is damaged is made anew, and
 //! runs that are killed go on.
 
-mod common;
-
-use common::palletiser;
+use crate::common::palletiser;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

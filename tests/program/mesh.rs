@@ -1,9 +1,7 @@
 //! Collision meshes from outside: what is blocked by points is blocked by the mesh, the same bytes
 //! for any number of threads, budgets of triangles, and requests that cannot be met.
 
-mod common;
-
-use common::palletiser;
+use crate::common::palletiser;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};

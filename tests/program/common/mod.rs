@@ -1,7 +1,5 @@
 //! What several tests run on: a small scene, its scans and its library of one model.
 
-#![allow(dead_code, reason = "each test takes what it needs")]
-
 use simulate::scene::Cuboid;
 use std::path::Path;
 use stillpoint::engine::Engine;

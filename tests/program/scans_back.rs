@@ -2,9 +2,7 @@
 //! moving points, with the same bytes on one thread and on two; another input than the run has read
 //! is refused.
 
-mod common;
-
-use common::palletiser;
+use crate::common::palletiser;
 use std::path::Path;
 use std::process::{Command, Output};
 

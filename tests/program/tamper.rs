@@ -2,9 +2,7 @@
 //! read it gives the same answer. And folders that lead elsewhere: nothing is read, moved or taken
 //! away through them.
 
-mod common;
-
-use common::boxed_cell;
+use crate::common::boxed_cell;
 use contract::Kind;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};

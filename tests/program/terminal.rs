@@ -5,8 +5,6 @@
 //! anew. What differs from machine to machine (paths, times, sizes of memory and disk) is replaced
 //! by a word in brackets first.
 
-mod common;
-
 use std::path::Path;
 use std::process::Command;
 
@@ -130,7 +128,7 @@ fn help_of_each_command() {
 #[test]
 fn what_a_small_file_holds() {
     let folder = tempfile::tempdir().expect("a folder");
-    common::palletiser(folder.path(), 3, 40_000);
+    crate::common::palletiser(folder.path(), 3, 40_000);
     compare("inspect", &shown(&["inspect", "scans/scans.e57"], folder.path()));
     compare("inspect-las", &shown(&["inspect", "scans/scans.las"], folder.path()));
 }
@@ -138,7 +136,7 @@ fn what_a_small_file_holds() {
 #[test]
 fn what_a_run_would_take() {
     let folder = tempfile::tempdir().expect("a folder");
-    common::palletiser(folder.path(), 3, 40_000);
+    crate::common::palletiser(folder.path(), 3, 40_000);
     let args = ["plan", "scans/scans.e57", "--robots", "robots", "--out", "out", "--threads", "2"];
     compare("plan", &shown(&[&args[..], &["--memory", "4GiB"]].concat(), folder.path()));
 }
@@ -151,7 +149,7 @@ fn errors() {
     std::fs::write(at.join("empty.e57"), "").expect("writes");
     std::fs::create_dir_all(at.join("library/unknown")).expect("is made");
     std::fs::write(at.join("library/unknown/model.txt"), "no URDF\n").expect("writes");
-    common::palletiser(at, 3, 40_000);
+    crate::common::palletiser(at, 3, 40_000);
     let run = ["run", "scans/scans.e57", "--robots", "library", "--out", "out"];
     let run = [&run[..], &["--progress", "none"]].concat();
     let cases: [(&str, &[&str]); 9] = [
