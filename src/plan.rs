@@ -2,7 +2,7 @@
 //! decides order.
 
 use crate::cache::input_tiles::InputTiles;
-use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, WholeResult};
+use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, VerifiedFiles, WholeResult};
 use crate::detect::calibrate::calibrate;
 use crate::detect::ground::Ground;
 use crate::detect::region_failures::RegionFailures;
@@ -15,9 +15,9 @@ use crate::estimate::Estimate;
 use crate::job::{Job, Outcome, Settings, units};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
-use crate::result::copc;
 use crate::result::plant_state::{PlantState, Records};
 use crate::result::report::Report;
+use crate::result::{copc, page};
 use crate::store::{Store, spatial_tiles};
 use contract::{Cluster, Fit, Input, Result, Space};
 use export::{COPC, ReviewEntry};
@@ -227,6 +227,7 @@ impl Run<'_> {
         }
         .write(next)?;
         let files = written.digests.iter().map(|sum| OutputFile::of(next, sum)).collect();
-        WholeResult { job, output, digests, outcome, files }.publish(engine)
+        let page = |files: &VerifiedFiles| page::of_run(next, files, &job.means, engine);
+        WholeResult { job, output, digests, outcome, files }.publish(page, engine)
     }
 }

@@ -23,7 +23,8 @@ pub(super) const LIST: &str = "manifest.json";
 pub(crate) const RESULT: &str = "result.json";
 /// Folder of files that are converted from a result afterwards; the manifest does not name them.
 pub(crate) const EXPORT: &str = "export";
-/// The page of a result, made on request; the manifest does not name it.
+/// The page of a result. The manifest names it where the run has made it, but not where it was made
+/// on request.
 pub(crate) const PAGE: &str = "report.html";
 /// Name and version of the format.
 const SCHEMA: &str = "stillpoint.manifest/2";
@@ -136,9 +137,8 @@ impl Manifest {
         files
     }
 
-    /// Lists the files in `next`, with the checksums in `known` where they are given, and writes
-    /// the manifest there.
-    pub(crate) fn write(
+    /// Lists the files in `next`, with the checksums in `known` where they are given.
+    pub(crate) fn list(
         next: &Path,
         key: Option<super::Key>,
         outcome: &Outcome,
@@ -155,18 +155,21 @@ impl Manifest {
             let listed = known.get(name(next, &path).as_str()).map(|file| (*file).clone());
             listed.map_or_else(|| output(next, &path, Algorithm::Blake3), Ok)
         })?;
-        let manifest = Self {
+        Ok(Self {
             schema: SCHEMA.into(),
             key: key.name().into(),
             summary: outcome.summary.clone(),
             warnings: outcome.warnings.clone(),
             partial: outcome.partial,
             files,
-        };
-        let text = serde_json::to_string_pretty(&manifest)
+        })
+    }
+
+    /// Writes the manifest to `next`, which is then complete.
+    pub(crate) fn write(&self, next: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self)
             .map_err(|e| Error::new(Kind::Bug, "the list of files cannot be written").because(e))?;
-        atomic::write(&next.join(LIST), sealed(&text).as_bytes())?;
-        Ok(manifest)
+        atomic::write(&next.join(LIST), sealed(&text).as_bytes())
     }
 
     /// Moves the files in `next` to `out` as the manifest lists them, and removes files that only
@@ -197,7 +200,7 @@ impl Manifest {
         if digest_of(&old, RESULT) != digest_of(&manifest.files, RESULT) {
             told.extend(old_scenes(out));
         }
-        if old != manifest.files {
+        if old != manifest.files && !stays(PAGE) {
             told.extend(forget(out, PAGE, "shows the earlier result; `stillpoint report --html`"));
         }
         shift(&next.join(RESULT), &out.join(RESULT))?;

@@ -4,6 +4,7 @@
 use super::digests::Digests;
 use super::manifest::{Manifest, OutputFile};
 use super::output::OutputDir;
+use super::verified::VerifiedFiles;
 use crate::engine::Engine;
 use crate::job::{Job, Outcome};
 use contract::Result;
@@ -19,16 +20,26 @@ pub(crate) struct WholeResult<'a> {
 }
 
 impl WholeResult<'_> {
-    /// Moves the result to the output folder and records the digests of its inputs and outputs.
-    /// Returns messages about files that were removed beside it.
+    /// Lets `add` make further files of the listed ones, moves the result to the output folder and
+    /// records the digests of its inputs and outputs. Returns messages of `add`, and about files
+    /// that were removed beside the result.
     ///
     /// # Errors
-    /// An input without a digest; an error of the file system.
-    pub(crate) fn publish(self, engine: &Engine) -> Result<Vec<String>> {
+    /// An input without a digest; an error of `add` or of the file system.
+    pub(crate) fn publish(
+        self,
+        add: impl FnOnce(&VerifiedFiles) -> Result<Vec<String>>,
+        engine: &Engine,
+    ) -> Result<Vec<String>> {
         let Self { job, output, digests, outcome, files } = self;
-        Manifest::write(output.next(), digests.result_key(job), outcome, files, engine)?;
-        let (manifest, told) = Manifest::publish(output.next(), output.out())?;
+        let (next, key) = (output.next(), digests.result_key(job));
+        let listed = Manifest::list(next, key.clone(), outcome, files, engine)?;
+        let known = listed.files.clone();
+        let mut told = add(&VerifiedFiles::unpublished(next, listed))?;
+        Manifest::list(next, key, outcome, known, engine)?.write(next)?;
+        let (manifest, removed) = Manifest::publish(next, output.out())?;
         digests.remember(&manifest, output.out())?;
+        told.extend(removed);
         Ok(told)
     }
 }

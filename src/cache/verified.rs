@@ -32,10 +32,19 @@ impl VerifiedFiles {
     /// There is no manifest, or it was changed.
     pub(crate) fn open(out: &Path) -> Result<Self> {
         let (manifest, digest) = Manifest::read_with_digest(out)?;
+        Ok(Self::listed_by(out, manifest, digest))
+    }
+
+    /// A result that is complete, but not published yet, so that its manifest has no digest.
+    pub(crate) fn unpublished(next: &Path, manifest: Manifest) -> Self {
+        Self::listed_by(next, manifest, String::new())
+    }
+
+    fn listed_by(out: &Path, manifest: Manifest, digest: String) -> Self {
         let names = manifest.files.iter().map(|file| file.path.clone());
         let places = names.enumerate().map(|(at, name)| (name, at)).collect();
         let compared = manifest.files.iter().map(|_| Mutex::new(false)).collect();
-        Ok(Self { out: out.to_path_buf(), manifest, digest, places, compared })
+        Self { out: out.to_path_buf(), manifest, digest, places, compared }
     }
 
     pub(crate) fn manifest(&self) -> &Manifest {
@@ -176,7 +185,8 @@ mod tests {
         std::fs::write(dir.path().join("labels/0.kind.npy"), b"labels").expect("writes");
         let outcome = Outcome { summary: "all \"well\"".into(), ..Outcome::default() };
         let key = Some(Key::of("test", &[]));
-        Manifest::write(dir.path(), key, &outcome, Vec::new(), &Engine::new(1)).expect("lists");
+        let list = Manifest::list(dir.path(), key, &outcome, Vec::new(), &Engine::new(1));
+        list.expect("lists").write(dir.path()).expect("writes");
         dir
     }
 

@@ -4,8 +4,8 @@ use super::bench_flags::{
     AccuracyFlags, Against, CheckBenchFlags, KeptFlags, PlanBenchFlags, PlantFlags,
     RescanBenchFlags, SeedFlags, ThroughputFlags,
 };
+use super::common::Common;
 use super::exit;
-use super::flags::Common;
 use super::say::Say;
 use crate::eval::bench::accuracy::{AccuracyBench, accuracy};
 use crate::eval::bench::check::{CheckBench, checks};

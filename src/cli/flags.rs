@@ -2,11 +2,9 @@
 //! on them.
 
 use super::bench_flags::BenchCommand;
-use super::say::LogFormat;
+use super::common::Common;
+use super::program_flags::{CompletionsFlags, ConfigCommand, ManualFlags, SchemaFlags};
 use crate::check::PathDoubt;
-use crate::engine::Engine;
-use crate::engine::progress::{Mode, Progress};
-use crate::job::{FlagValues, Means};
 use crate::result::conversion::ExportFormat;
 use crate::result::mesh_export::MeshFormat;
 use clap::{Args, Parser, Subcommand};
@@ -39,8 +37,8 @@ pub(super) enum Command {
     Rescan(RescanFlags),
     /// Verify that the files of a result are unchanged since they were written
     Verify(OutFlags),
-    /// Show the summary of a result again; --html writes a page with the plant in 3D, --junit its
-    /// robots as test cases for a build server
+    /// Print all about a result; --html makes sure that there is a page with the plant in 3D,
+    /// --junit writes its robots as test cases for a build server
     Report(ReportFlags),
     /// Write the points of a result in another format, or its scene for planners and simulators
     Export(ExportFlags),
@@ -59,23 +57,15 @@ pub(super) enum Command {
     /// Check and calibrate robot libraries
     #[command(subcommand)]
     Robots(RobotsCommand),
+    /// Show the settings of a run and where each value comes from
+    #[command(subcommand)]
+    Config(ConfigCommand),
+    /// Print the JSON schema of a file that the program reads or writes; --out writes all of them
+    Schema(SchemaFlags),
     /// Print a script that completes commands and options in a shell
     Completions(CompletionsFlags),
     /// Write manual pages for `man`, one for each command
     Manual(ManualFlags),
-}
-
-#[derive(Debug, Args)]
-pub(super) struct CompletionsFlags {
-    /// The shell
-    pub(super) shell: clap_complete::Shell,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct ManualFlags {
-    /// Folder of the pages, made if it is not there
-    #[arg(value_name = "DIR")]
-    pub(super) out: PathBuf,
 }
 
 #[derive(Debug, Subcommand)]
@@ -92,6 +82,10 @@ pub(super) struct DemoFlags {
     /// removed)
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
+    /// Number of beams of each of the four scanners; 300000 makes a small cell that takes seconds
+    /// (default: about three million)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10_000..=100_000_000))]
+    pub(super) beams: Option<u64>,
 }
 
 #[derive(Debug, Args)]
@@ -125,6 +119,9 @@ pub(super) struct RunFlags {
     /// Also estimate the joint axes of each robot, for robots that their models fit poorly
     #[arg(long)]
     pub(super) calibrate: bool,
+    /// Write a small result: compressed tiles, no cloud of fixed points (takes longer)
+    #[arg(long)]
+    pub(super) lean: bool,
 }
 
 #[derive(Debug, Args)]
@@ -292,8 +289,8 @@ pub(super) struct ReportFlags {
     /// Write each robot as a test case to this JUnit file: trusted ones pass
     #[arg(long, value_name = "FILE")]
     pub(super) junit: Option<PathBuf>,
-    /// Write OUT/report.html: the plant in 3D with tables, one file that any browser shows offline;
-    /// a later run into OUT removes it if the result has changed, and reports it
+    /// Write OUT/report.html where the run has not: the plant in 3D with tables, one file that any
+    /// browser shows offline; a later run into OUT replaces it if the result has changed
     #[arg(long)]
     pub(super) html: bool,
     /// Print the data of that page as JSON
@@ -348,78 +345,6 @@ pub(super) struct CalibrateFlags {
     pub(super) out: PathBuf,
 }
 
-/// Flags of all commands.
-#[derive(Debug, Args)]
-pub(super) struct Common {
-    /// Upper bound of resident memory, for example 4GiB
-    #[arg(long, global = true, value_name = "SIZE")]
-    memory: Option<String>,
-    /// Number of worker threads (default: one per core)
-    #[arg(long, global = true, value_name = "N")]
-    threads: Option<usize>,
-    /// File of scanner poses (TOML or JSON), for formats without poses
-    #[arg(long, global = true, value_name = "FILE")]
-    scanners: Option<PathBuf>,
-    /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; NAME=UNIT for one file,
-    /// us-ft/m for heights in another unit, several separated by commas (default: what each file
-    /// declares, or metres)
-    #[arg(long, global = true, value_name = "UNIT")]
-    units: Option<String>,
-    /// Configuration file with settings (TOML)
-    #[arg(long, global = true, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// One setting, for example fit.beam=150; takes precedence over the configuration file
-    #[arg(long, global = true, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Method that finds postures: "beam" (default), or "paper", the link-by-link method of the
-    /// paper
-    #[arg(long, global = true, value_name = "NAME")]
-    method: Option<String>,
-    /// How progress is shown (default: a bar on a terminal, lines elsewhere)
-    #[arg(long, global = true, value_enum, value_name = "HOW")]
-    progress: Option<Mode>,
-    /// How warnings and errors are written
-    #[arg(long, global = true, value_enum, value_name = "HOW", default_value = "text")]
-    pub(super) log_format: LogFormat,
-}
-
-impl Common {
-    /// Combines and checks defaults, configuration and flags.
-    pub(super) fn means(&self) -> Result<Means> {
-        let method = self.method.iter().map(|name| format!("fit.method={name}"));
-        let units = self.units.iter().map(|unit| format!("ingest.units=\"{unit}\""));
-        Means::of(&FlagValues {
-            memory: self.memory.clone(),
-            threads: self.threads,
-            config: self.config.clone(),
-            set: self.set.iter().cloned().chain(method).chain(units).collect(),
-        })
-    }
-
-    /// The file of scanner poses: that of the flag, else that of the configuration.
-    pub(super) fn scanners(&self, means: &Means) -> Option<PathBuf> {
-        self.scanners.clone().or_else(|| means.scanners.clone())
-    }
-
-    /// An engine that shows progress and reacts to Ctrl-C. It may be created only once.
-    pub(super) fn engine(&self, means: &Means) -> Result<Engine> {
-        let mut engine = Engine::new(means.n_threads);
-        engine.channel_bytes = means.channel_bytes();
-        engine.is_narrow = means.is_narrow();
-        engine.progress = match (self.progress, self.log_format) {
-            // With JSON requested, bars and lines for people are left out.
-            (Some(Mode::None), LogFormat::Json) => Progress::json_without_progress(),
-            (_, LogFormat::Json) => Progress::new(Mode::Json),
-            (mode, LogFormat::Text) => Progress::new(mode.unwrap_or_else(Mode::fitting)),
-        };
-        engine.cancel.on_ctrl_c()?;
-        // Libraries that use rayon by themselves get the same number of threads; a pool that exists
-        // already (in tests) is kept.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
-        Ok(engine)
-    }
-}
-
 /// Refuses inputs that are not files, before anything else is done.
 pub(super) fn present(inputs: &[PathBuf]) -> Result<()> {
     inputs.iter().try_for_each(|path| ingest::regular(path))
@@ -428,11 +353,10 @@ pub(super) fn present(inputs: &[PathBuf]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn flags_are_consistent() {
-        Line::command().debug_assert();
+        crate::cli::help::command().debug_assert();
     }
 
     #[test]
@@ -442,7 +366,7 @@ mod tests {
             "stillpoint run a.e57 b.ptx --robots r --out o --threads 2",
         ] {
             let line = Line::try_parse_from(args.split(' ')).expect("parses");
-            assert_eq!(line.common.threads, Some(2));
+            assert_eq!(line.common.threads(), Some(2));
             let Command::Run(run) = line.command else { panic!("{args}") };
             assert_eq!(run.inputs.len(), 2);
         }

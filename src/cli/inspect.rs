@@ -1,7 +1,8 @@
 //! The command `inspect`: prints the contents of inputs, and which missing data make results worse.
 
+use super::common::Common;
 use super::exit;
-use super::flags::{Common, InspectFlags, present};
+use super::flags::{InspectFlags, present};
 use super::say::Say;
 use crate::engine::AllThreads;
 use contract::Result;

@@ -3,22 +3,28 @@
 
 mod bench;
 mod bench_flags;
+mod common;
+mod config;
 mod demo;
 pub mod exit;
 mod flags;
+mod help;
 mod inspect;
 mod keep_going;
 mod manual;
+mod program_flags;
 mod results;
 mod robots;
 mod run;
 mod say;
+mod schema;
 mod simulate;
 
 use bench_flags::BenchCommand;
-use clap::Parser;
+use clap::FromArgMatches;
 use contract::{Error, Kind, Result, fence};
 use flags::{Command, Line, RobotsCommand};
+use program_flags::ConfigCommand;
 use say::{LogFormat, Say};
 use std::ffi::OsString;
 
@@ -26,7 +32,8 @@ use std::ffi::OsString;
 #[must_use]
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args: Vec<OsString> = args.into_iter().collect();
-    let line = match Line::try_parse_from(&args) {
+    let found = help::command().try_get_matches_from(&args);
+    let line = match found.and_then(|found| Line::from_arg_matches(&found)) {
         Ok(line) => line,
         Err(error) => return refuse(&error, &args),
     };
@@ -91,6 +98,8 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
         Command::Robots(RobotsCommand::Calibrate(flags)) => {
             robots::calibrate(flags, &line.common, say)
         }
+        Command::Config(ConfigCommand::Print(flags)) => config::print(flags, &line.common, say),
+        Command::Schema(flags) => schema::schema(flags, say),
         Command::Completions(flags) => Ok(manual::completions(flags, say)),
         Command::Manual(flags) => manual::manual(flags, say),
     }

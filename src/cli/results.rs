@@ -1,9 +1,10 @@
 //! The commands `verify`, `report`, `export`, `check`, `diff` and `history`, which read results of
 //! earlier runs.
 
+use super::common::Common;
 use super::exit;
 use super::flags::{
-    CheckFlags, Common, DiffFlags, ExportFlags, HistoryFlags, MeshFlags, OutFlags, ReportFlags,
+    CheckFlags, DiffFlags, ExportFlags, HistoryFlags, MeshFlags, OutFlags, ReportFlags,
 };
 use super::say::Say;
 use crate::cache::{Manifest, VerifiedFiles, result_of};
@@ -18,6 +19,7 @@ use crate::result::mesh_export::{MeshFormat, MeshRequest, export_mesh};
 use crate::result::page::{page_data, write_page};
 use crate::result::scans_back::{ScansBack, give_scans_back};
 use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
+use crate::result::text_report::text_report;
 use crate::{cache, check};
 use contract::words::count;
 use contract::{Error, Format, Kind, Result};
@@ -52,7 +54,8 @@ pub(super) fn report(flags: &ReportFlags, common: &Common, say: &Say) -> Result<
     if let Some(path) = &flags.junit {
         export::write_junit(path, &files.result()?, files.manifest().partial)?;
     }
-    let Manifest { mut summary, warnings, partial, .. } = files.manifest().clone();
+    let Manifest { warnings, partial, .. } = files.manifest().clone();
+    let mut summary = text_report(&flags.out, &files)?;
     if flags.html {
         let means = common.means()?;
         let page = write_page(&flags.out, &means, &common.engine(&means)?)?;

@@ -1,8 +1,9 @@
 //! The commands `robots lint`, which reports faults of a library, and `robots calibrate`, which
 //! writes a corrected model.
 
+use super::common::Common;
 use super::exit;
-use super::flags::{CalibrateFlags, Common, LintFlags};
+use super::flags::{CalibrateFlags, LintFlags};
 use super::say::Say;
 use crate::detect::calibrate::{WantedRobots, combine};
 use contract::words::count;

@@ -1,19 +1,25 @@
 //! The commands `run`, `plan` and `rescan`.
 
-use super::flags::{Common, PlanFlags, RescanFlags, RunFlags, present};
+use super::common::Common;
+use super::flags::{PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;
 use super::{exit, keep_going};
 use crate::engine::Engine;
 use crate::estimate::{estimate, with_missing};
-use crate::job::Job;
+use crate::eval::demo::peak_memory;
+use crate::job::{Job, Means, Outcome};
 use crate::rescan::{self, Cell, Frame, RescanRequest};
+use crate::result::run_record::{MeasuredRun, RunRecord};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::fmt::Write as _;
+use std::time::Instant;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
     let (job, engine) = job(flags, common)?;
+    let started = Instant::now();
     let mut outcome = keep_going::run(&job, &engine).map_err(|e| with_missing(e, &job, &engine))?;
+    record(&job, &engine, started, &outcome, say);
     let _ = writeln!(outcome.summary, "result in {}", job.out.join("result.json").display());
     say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
@@ -49,10 +55,32 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
             )
         },
     };
+    let started = Instant::now();
     let mut outcome = rescan::rescan(&request, &engine)?;
+    record(&request.job, &engine, started, &outcome, say);
     let _ = writeln!(outcome.summary, "result in {}", flags.out.join("result.json").display());
     say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+}
+
+/// Keeps times and memory of a run beside its result. A run whose record cannot be kept is as good.
+fn record(job: &Job, engine: &Engine, started: Instant, outcome: &Outcome, say: &Say) {
+    let run = MeasuredRun {
+        seconds: started.elapsed().as_secs_f64(),
+        peak_memory_bytes: peak_memory(),
+        stages: &engine.progress.reports(),
+    };
+    if let Err(error) = RunRecord::keep(&job.out, &run, &job.means, outcome) {
+        say.warning(&format!("times of the run are not kept: {error}"));
+    }
+}
+
+/// Sets what `--lean` is short for, except what is set by itself.
+fn make_lean(means: &mut Means) {
+    let export = &mut means.settings.export;
+    let is_open = |key: &str| means.origins.of(key).is_none();
+    export.compress |= is_open("export.compress");
+    export.fixed_cloud &= !is_open("export.fixed_cloud");
 }
 
 fn cell(flags: &RescanFlags) -> Result<Cell> {
@@ -90,6 +118,9 @@ fn frame(wish: Option<&str>) -> Result<Frame> {
 fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {
     let mut means = common.means()?;
     means.settings.fit.calibrate |= flags.calibrate;
+    if flags.lean {
+        make_lean(&mut means);
+    }
     present(&flags.inputs)?;
     let engine = common.engine(&means)?;
     let job = Job {

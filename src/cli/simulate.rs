@@ -1,7 +1,8 @@
 //! The command `simulate`: scans a scene and writes scans and truth.
 
+use super::common::Common;
 use super::exit;
-use super::flags::{Common, SimulateFlags};
+use super::flags::SimulateFlags;
 use super::say::Say;
 use crate::eval::virtual_scan::{Formats, read_scene, scan_scene};
 use contract::words::count;

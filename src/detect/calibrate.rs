@@ -74,9 +74,11 @@ struct PostureReading {
     joints: BTreeMap<String, f64>,
 }
 
+/// What a controller has shown, posture by posture.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PostureReadings {
+    /// The postures.
     #[serde(default)]
     posture: Vec<PostureReading>,
 }

@@ -13,7 +13,7 @@ use crate::store::spatial_tiles;
 use contract::words::count;
 use contract::{Error, Input, Kind, Result};
 use ingest::{KnownScanners, Sources};
-use rates::{COPC, INGEST, LOAD, REST, SPREAD};
+use rates::{COPC, INGEST, LOAD, PAGE, REST, SPREAD};
 use serde::Serialize;
 use std::path::Path;
 
@@ -29,6 +29,9 @@ const COMPRESSED: f64 = 0.35;
 const CLOUD_BYTES: [u64; 2] = [34, 40];
 /// Size of a point in the temporary files of a COPC conversion, bytes.
 const COPC_BYTES: u64 = 40;
+/// Largest size of the page of a result, and its share for each point of a small one, bytes.
+const PAGE_BYTES: u64 = 15 << 20;
+const PAGE_POINT_BYTES: u64 = 4;
 /// Estimated size of a point in a text file, bytes.
 const TEXT_BYTES: u64 = 45;
 /// Size of pictures, cached models, voxels and lists for each model of the library, bytes: 7 to 11
@@ -184,6 +187,9 @@ impl Estimate {
         let clouds = ((n_clouds * (cloud + body)) as f64 * share).ceil() as u64;
         let copc = if export.copc { COPC_BYTES + (cloud as f64 * COMPRESSED) as u64 } else { 0 };
         let labelled = n.saturating_mul(LABEL_BYTES + clouds + copc);
+        let page = n.saturating_mul(PAGE_POINT_BYTES).saturating_add(1 << 20).min(PAGE_BYTES);
+        // One thread makes the page, whatever their number.
+        seconds += if export.page { n as f64 / PAGE * threads } else { 0.0 };
         seconds += if export.copc { n as f64 / COPC } else { 0.0 };
         let base = PROGRAM_BYTES + models * MODEL_BYTES;
         let memory = n.saturating_mul(POINT_BYTES).saturating_add(base);
@@ -196,6 +202,7 @@ impl Estimate {
             store_bytes: n_new.saturating_mul(STORE_BYTES),
             output_bytes: labelled
                 .saturating_add(models * EXTRA_BYTES)
+                .saturating_add(if export.page { page } else { 0 })
                 .saturating_add(tiles[0].saturating_mul(TILE_BYTES)),
             tiles,
             free_bytes: free(&job.out),

@@ -7,8 +7,10 @@ use crate::detect::library;
 use crate::engine::Engine;
 use crate::job::{Job, Means, Outcome};
 use crate::plan;
+use crate::result::run_record::{MeasuredRun, RunRecord};
 use contract::{Error, Kind, Result};
 use export::atomic;
+use simulate::Scene;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -16,8 +18,17 @@ use std::time::Instant;
 /// Seed of the cell: any other gives another cell.
 const SEED: u64 = 1;
 
-/// Keeps everything in `out`, or in a temporary folder.
-pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome> {
+/// By how much a joint of the cell stands elsewhere at another time, radians (20°).
+const TURN: f64 = 0.349;
+
+/// Keeps everything in `out`, or in a temporary folder. Each scanner sends about `n_beams` beams,
+/// or as many as a crew would take.
+pub fn run(
+    out: Option<&Path>,
+    n_beams: Option<u64>,
+    means: &Means,
+    engine: &Engine,
+) -> Result<Outcome> {
     let temporary = out.is_none().then(tempfile::tempdir).transpose()?;
     let dir: PathBuf = match (out, &temporary) {
         (Some(out), _) => out.to_path_buf(),
@@ -28,8 +39,12 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
     write_robots(&robots)?;
     let started = Instant::now();
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
-    let scene = simulate::demo_scene(SEED, &models)?;
+    let mut scene = simulate::demo_scene(SEED, &models)?;
+    if n_beams.is_some() {
+        scene.scanners.iter_mut().for_each(|scanner| scanner.raster.n_beams = n_beams);
+    }
     atomic::write(&dir.join("scene.toml"), scene.to_toml()?.as_bytes())?;
+    atomic::write(&dir.join("scene_later.toml"), later(&scene).to_toml()?.as_bytes())?;
     let truth = scan_scene(&scene, &models, &dir.join("scans"), Formats::ALL, engine)?;
     let scanned = started.elapsed().as_secs_f64();
     let job =
@@ -37,6 +52,12 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
     let started = Instant::now();
     let outcome = plan::run(&job, engine)?;
     let seconds = started.elapsed().as_secs_f64();
+    let run = MeasuredRun {
+        seconds,
+        peak_memory_bytes: peak_memory(),
+        stages: &engine.progress.reports(),
+    };
+    RunRecord::keep(&job.out, &run, means, &outcome)?;
     let agreement = Agreement::of(&job.out, &dir.join("scans/truth"))?;
     let n_points: u64 = truth.scans.iter().map(|s| s.n_points).sum();
     let mut summary = outcome.summary;
@@ -56,6 +77,16 @@ pub fn run(out: Option<&Path>, means: &Means, engine: &Engine) -> Result<Outcome
         let _ = writeln!(summary, "`stillpoint demo --out DIR` keeps scene, scans and results");
     }
     Ok(Outcome { summary, ..outcome })
+}
+
+/// The cell at another time: other errors of the scanner, and the last robot has turned. It is for
+/// whoever tries a rescan.
+fn later(scene: &Scene) -> Scene {
+    let mut later = Scene { seed: scene.seed + 1, ..scene.clone() };
+    if let Some(turned) = later.robots.last_mut().and_then(|r| r.posture.values_mut().next()) {
+        *turned += TURN;
+    }
+    later
 }
 
 /// Writes the demo's robot library.

@@ -11,7 +11,8 @@ use std::path::{Component, Path, PathBuf};
 /// Folders of a result whose files its list may name.
 pub(crate) const FOLDERS: [&str; 5] = ["tiles", "clouds", "labels", "robots", "pictures"];
 /// Files of a result outside of those folders.
-pub(crate) const FILES: [&str; 4] = ["result.json", "plant.bin", "changes.json", "changes.csv"];
+pub(crate) const FILES: [&str; 5] =
+    ["result.json", "plant.bin", "changes.json", "changes.csv", "report.html"];
 
 /// Whether `name` can be a file of a result: relative, without dots, and either one of [`FILES`] or
 /// inside one of [`FOLDERS`].

@@ -3,6 +3,7 @@
 
 mod memory;
 mod method;
+mod origin;
 pub(crate) mod places;
 mod settings;
 pub(crate) mod units;
@@ -10,6 +11,7 @@ mod value;
 
 pub use memory::{memory_bytes, memory_words};
 pub use method::Method;
+pub use origin::{SettingOrigin, SettingOrigins};
 pub use settings::Settings;
 
 use crate::engine::CHANNEL_BYTES;
@@ -70,6 +72,8 @@ pub struct Means {
     pub scanners: Option<PathBuf>,
     /// Settings of all stages.
     pub settings: Settings,
+    /// Where values that differ from the defaults come from.
+    pub origins: SettingOrigins,
 }
 
 /// Outcome of a run, for the command line.
@@ -97,13 +101,15 @@ pub struct FlagValues {
     pub threads: Option<usize>,
     /// `--config`.
     pub config: Option<PathBuf>,
+    /// Variables of the environment that hold a setting each, with their values.
+    pub environment: Vec<(String, String)>,
     /// `--set`, in order.
     pub set: Vec<String>,
 }
 
 impl Means {
-    /// Applies in this order: defaults, the configuration file, `--set`, other flags. Later ones
-    /// take precedence.
+    /// Applies in this order: defaults, the configuration file, the environment, `--set`, other
+    /// flags. Later ones take precedence.
     ///
     /// # Errors
     /// `Usage` for an unknown key or a value of the wrong kind; `BadInput` for a configuration that
@@ -114,21 +120,39 @@ impl Means {
             n_threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
             scanners: None,
             settings: Settings::default(),
+            origins: SettingOrigins::default(),
         };
-        // `--set` is applied before the file, whose length it may bound, and again after it, since
-        // it takes precedence.
-        means.set_all(&given.set)?;
+        // `--set` and the environment are applied before the file, whose length they may bound, and
+        // again after it, since they take precedence.
+        means.set_all(given)?;
         if let Some(path) = &given.config {
             means.read(path)?;
-            means.set_all(&given.set)?;
+            means.set_all(given)?;
         }
         if let Some(memory) = &given.memory {
             means.memory_bytes = memory_bytes(memory).map_err(|e| e.at("--memory"))?;
+            means.origins.note("memory", SettingOrigin::Flag("--memory"));
         }
         if let Some(threads) = given.threads {
             means.n_threads = threads;
+            means.origins.note("threads", SettingOrigin::Flag("--threads"));
         }
         means.checked()
+    }
+
+    /// All settings as a configuration file, which `--config` reads; `with_origin` adds where each
+    /// value comes from, and `only_changed` leaves out what is at its default.
+    #[must_use]
+    pub fn as_toml(&self, with_origin: bool, only_changed: bool) -> String {
+        let words = memory_words(self.memory_bytes);
+        let is_exact = memory_bytes(&words).is_ok_and(|bytes| bytes == self.memory_bytes);
+        let memory = if is_exact { format!("\"{words}\"") } else { self.memory_bytes.to_string() };
+        let mut all = vec![("memory", memory), ("threads", self.n_threads.to_string())];
+        let scanners = self.scanners.as_ref().map(|path| path.to_string_lossy().into_owned());
+        all.extend(scanners.map(|path| ("scanners", toml::Value::String(path).to_string())));
+        let settings = self.settings.all();
+        all.extend(settings.iter().map(|(key, value)| (*key, value.to_string())));
+        origin::as_toml(&all, &self.origins, with_origin, only_changed)
     }
 
     /// Memory for points that wait for their tiles, bytes: a quarter of what the program itself
@@ -183,13 +207,21 @@ impl Means {
         Ok(self)
     }
 
-    fn set_all(&mut self, pairs: &[String]) -> Result<()> {
-        for pair in pairs {
+    /// Applies the environment, and then `--set`.
+    fn set_all(&mut self, given: &FlagValues) -> Result<()> {
+        for (name, value) in &given.environment {
+            let key = origin::setting_of_variable(name)
+                .ok_or_else(|| usage(format!("there is no setting for the variable {name}")))?;
+            self.set(&key, &parsed(value.trim())).map_err(|e| e.at(name))?;
+            self.origins.note(&key, SettingOrigin::Environment(name.clone()));
+        }
+        for pair in &given.set {
             let (key, value) = pair.split_once('=').ok_or_else(|| {
                 usage(format!("--set takes key=value, got \"{pair}\""))
                     .hint("for example fit.beam=150")
             })?;
             self.set(key.trim(), &parsed(value.trim())).map_err(|e| e.at("--set"))?;
+            self.origins.note(key.trim(), SettingOrigin::Set);
         }
         Ok(())
     }
@@ -211,9 +243,14 @@ impl Means {
                 toml::Value::Table(room) => {
                     for (field, value) in room {
                         self.set(&format!("{key}.{field}"), value)?;
+                        let origin = SettingOrigin::File(path.to_path_buf());
+                        self.origins.note(&format!("{key}.{field}"), origin);
                     }
                 }
-                value => self.set(key, value)?,
+                value => {
+                    self.set(key, value)?;
+                    self.origins.note(key, SettingOrigin::File(path.to_path_buf()));
+                }
             }
         }
         // A path in a configuration is relative to the folder of the configuration.
@@ -290,6 +327,7 @@ mod tests {
             threads: None,
             config: Some(path),
             set: vec!["fit.beam=99".into(), "fit.plane_sigma=[0.1, 2]".into()],
+            ..FlagValues::default()
         };
         let means = Means::of(&given).expect("reads");
         assert_eq!((means.memory_bytes, means.n_threads), (1 << 30, 3));

@@ -116,7 +116,7 @@ settings! {
         min_size, min_voxels, min_points, robot_margin,
     }
     export: export::Settings {
-        tiles, tile_edge, max_tiles, fixed_cloud, bodies, copc, compress, waiting_bytes,
+        tiles, tile_edge, max_tiles, fixed_cloud, bodies, copc, compress, page, waiting_bytes,
     }
 }
 
@@ -130,7 +130,7 @@ const RENAMED: [(&str, &str); 4] = [
 ];
 
 /// The present name of a setting that may be given by a former one.
-fn present_name(key: &str) -> String {
+pub(super) fn present_name(key: &str) -> String {
     let renamed = RENAMED.iter().find_map(|(old, new)| Some((new, key.strip_prefix(old)?)));
     renamed.map_or_else(|| key.into(), |(new, rest)| format!("{new}{rest}"))
 }

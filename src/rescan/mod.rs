@@ -22,7 +22,7 @@ pub use frame::Frame;
 pub use session::Cell;
 
 use crate::cache::input_tiles::InputTiles;
-use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, WholeResult};
+use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, VerifiedFiles, WholeResult};
 use crate::detect::library;
 use crate::detect::robots::RobotList;
 use crate::detect::search::PreparedLibrary;
@@ -201,7 +201,9 @@ impl Rescan<'_> {
             ..base.state.clone()
         };
         state.write(output.next())?;
-        WholeResult { job, output, digests, outcome, files }.publish(engine)
+        // A page takes all tiles of the plant, which a rescan does not read: it is made on request.
+        let no_page = |_: &VerifiedFiles| Ok(Vec::new());
+        WholeResult { job, output, digests, outcome, files }.publish(no_page, engine)
     }
 }
 

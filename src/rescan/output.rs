@@ -5,7 +5,7 @@ use super::earlier_points::EarlierPoints;
 use super::found::RescanFindings;
 use super::report;
 use super::report::RescanReport;
-use crate::cache::{Digests, OutputDir, OutputFile};
+use crate::cache::{Digests, OutputDir, OutputFile, PAGE};
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::FittedRobots;
 use crate::engine::Engine;
@@ -74,6 +74,8 @@ impl RescanFindings<'_, '_> {
         };
         let outcome = said.finish(digests, next)?;
         written.extend(report::NAMES.map(String::from));
+        // The page of the earlier result does not show what is new.
+        written.insert(PAGE.into());
         let spaces = done.spaces.iter().flatten();
         written.extend(spaces.flat_map(|s| [&s.grid, &s.octomap, &s.unknown]).cloned());
         let rewritten = self.robots.changed.iter().chain(&self.robots.gone);

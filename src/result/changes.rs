@@ -8,7 +8,7 @@
 use contract::words::{Unit, triple};
 use contract::{Fit, Verdict, quote};
 use export::{ResultFile, RobotEntry};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
@@ -30,7 +30,7 @@ const LEAST_SHIFT: f64 = 0.010;
 const LEAST_TURN: f64 = 0.002_6;
 
 /// Change of one robot.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Change {
     /// Base and joints are the same as far as both results determine them.
@@ -49,7 +49,7 @@ pub enum Change {
 }
 
 /// A joint in both results.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointChange {
     /// Name of the joint in the URDF.
     pub joint: String,
@@ -66,7 +66,7 @@ pub struct JointChange {
 }
 
 /// The comparison of one robot.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotChange {
     /// Its id in the first result.
     pub then: Option<String>,

@@ -16,5 +16,7 @@ pub(crate) mod page;
 pub(crate) mod plant_probe;
 pub(crate) mod plant_state;
 pub(crate) mod report;
+pub mod run_record;
 pub mod scans_back;
 pub mod scene_export;
+pub(crate) mod text_report;

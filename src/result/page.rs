@@ -8,8 +8,8 @@ use crate::detect::robots::RobotList;
 use crate::engine::{Amount, Engine};
 use crate::io::own_paths::without_links;
 use crate::job::{Job, Means};
-use contract::{Error, Fit, Result, Verdict};
-use export::{BasePose, ResultFile, RobotEntry, WrittenBodies, read_tile};
+use contract::{Error, Fit, Kind, Result, Verdict};
+use export::{BasePose, InputEntry, ResultFile, RobotEntry, WrittenBodies, read_tile};
 use geometry::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use report_page::{PageLoop, PagePoint, PagePoints, PageRobot, PageScanner, PageTexts, ReportPage};
@@ -76,10 +76,9 @@ impl<'a> ReportedResult<'a> {
                 .map_err(|e| Error::bad_input("file is not text").because(e).at(name))
         };
         let changes = self.result.rescan.as_ref().map(|rescan| text(&rescan.changes));
-        let whole = std::fs::canonicalize(self.out).unwrap_or_else(|_| self.out.to_path_buf());
         let manifest = self.files.manifest();
         Ok(PageTexts {
-            title: whole.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            title: title(&self.result.inputs),
             program: env!("CARGO_PKG_VERSION").into(),
             result: text(RESULT)?,
             changes: changes.transpose()?,
@@ -182,13 +181,51 @@ impl<'a> ReportedResult<'a> {
     }
 }
 
-/// Makes the page of the result in `out` and returns its path.
+/// The title of a page: its inputs, so that the same result gives the same bytes in any folder.
+fn title(inputs: &[InputEntry]) -> String {
+    let name = |input: &InputEntry| {
+        let path = Path::new(&input.path);
+        path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    };
+    match inputs {
+        [] => "Stillpoint".into(),
+        [only] => name(only),
+        [first, others @ ..] => format!("{} and {} more", name(first), others.len()),
+    }
+}
+
+/// Makes the page of a result that is about to be published, unless the settings leave it out.
+/// Returns a message where it cannot be made of the result: that does not make the run fail.
+///
+/// # Errors
+/// The run was interrupted, or the page cannot be written.
+pub(crate) fn of_run(
+    next: &Path,
+    files: &VerifiedFiles,
+    means: &Means,
+    engine: &Engine,
+) -> Result<Vec<String>> {
+    if !means.settings.export.page {
+        return Ok(Vec::new());
+    }
+    let page = ReportedResult::open(next, files, means, engine).and_then(|result| result.write());
+    match page {
+        Ok(_) => Ok(Vec::new()),
+        Err(e) if matches!(e.kind(), Kind::Cancelled | Kind::Io) => Err(e),
+        Err(e) => Ok(vec![format!("the result has no page: {e}")]),
+    }
+}
+
+/// Makes the page of the result in `out`, unless its run has made it, and returns its path.
 ///
 /// # Errors
 /// There is no result, a file of it was changed, another run uses the folder, or the page cannot
 /// be written.
 pub(crate) fn write_page(out: &Path, means: &Means, engine: &Engine) -> Result<PathBuf> {
     let files = VerifiedFiles::open(out)?;
+    if files.has(PAGE) {
+        return files.compared(PAGE);
+    }
     // No run can use a result that was copied without its store.
     let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
     ReportedResult::open(out, &files, means, engine)?.write()

@@ -87,7 +87,7 @@ fn compare(name: &str, text: &str) {
 }
 
 /// Words of the command line that lead to a command of their own.
-const COMMANDS: [&str; 23] = [
+const COMMANDS: [&str; 25] = [
     "",
     "demo",
     "inspect",
@@ -111,6 +111,8 @@ const COMMANDS: [&str; 23] = [
     "robots",
     "robots lint",
     "robots calibrate",
+    "config print",
+    "schema",
 ];
 
 #[test]

@@ -178,8 +178,8 @@ fn scenes_are_the_same_and_load(dir: &Path, robots: &Path) {
     }
 }
 
-/// A page is made of the result, twice with the same bytes; it holds the result as it is, and a
-/// changed mesh is refused.
+/// The run has made a page of the result, which `report --html` leaves as it is; it holds the
+/// result as it is, and a changed page is refused.
 fn page_shows_the_result(out: &Path) {
     let report = |flag: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_stillpoint"));
@@ -189,7 +189,9 @@ fn page_shows_the_result(out: &Path) {
         assert!(report("--html").status.success());
         std::fs::read_to_string(out.join("report.html")).expect("a page")
     };
-    let page = make();
+    let list = std::fs::read_to_string(out.join("manifest.json")).expect("a list");
+    assert!(list.contains("report.html"), "the page is one of the files of the result");
+    let page = std::fs::read_to_string(out.join("report.html")).expect("a page");
     assert!(page == make(), "the same bytes");
     assert!(page.len() < 15_000_000, "{} bytes", page.len());
     let data = page.split_once("id=\"data\">").expect("data").1;
@@ -209,13 +211,13 @@ fn page_shows_the_result(out: &Path) {
     assert!(view["robots"][0]["mesh"].is_u64(), "a body");
     let printed = report("--json");
     assert_eq!(value(&String::from_utf8_lossy(&printed.stdout))["result"], result);
-    let mesh = out.join("robots/R1/meshes/00_base_link.stl");
-    let mut bytes = std::fs::read(&mesh).expect("a mesh");
+    let path = out.join("report.html");
+    let mut bytes = std::fs::read(&path).expect("a page");
     bytes[200] ^= 1;
-    std::fs::write(&mesh, bytes).expect("writes");
+    std::fs::write(&path, bytes).expect("writes");
     let refused = report("--html");
     assert_eq!(refused.status.code(), Some(4));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("00_base_link.stl"));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("report.html"));
 }
 
 /// Space about the robot: its body is its own, the air beside it was seen, the floor is fixed.

@@ -24,6 +24,9 @@ pub struct Settings {
     pub copc: bool,
     /// Whether clouds are compressed (LAZ): a quarter of the disk space at a tenth of the speed.
     pub compress: bool,
+    /// Whether the page of the result for a browser is written (`report.html`), at most 15 MB. All
+    /// tiles are read once more for it.
+    pub page: bool,
     /// Memory for records that wait to be written to their tiles, bytes.
     pub waiting_bytes: usize,
 }
@@ -38,6 +41,7 @@ impl Default for Settings {
             bodies: false,
             copc: false,
             compress: false,
+            page: true,
             waiting_bytes: 64 << 20,
         }
     }

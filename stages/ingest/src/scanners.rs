@@ -30,18 +30,25 @@ pub struct KnownScanners {
     pub entries: Vec<KnownScanner>,
 }
 
+/// Scanner poses for files that state none.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileText {
-    scanner: Vec<EntryText>,
+struct ScannersFile {
+    /// The scanners, in any order.
+    scanner: Vec<ScannerText>,
 }
 
+/// One scanner.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct EntryText {
+struct ScannerText {
+    /// `point_source_id` of the scanner's points; not needed where there is one scanner.
     point_source_id: Option<u16>,
+    /// Name of its scan.
     name: Option<String>,
+    /// Position of the scanner in the world, metres.
     position: [f64; 3],
+    /// Rotation `world_from_scan`, unit quaternion; no rotation without it.
     quaternion_wxyz: Option<[f64; 4]>,
 }
 
@@ -63,7 +70,7 @@ impl KnownScanners {
     pub fn parse(text: &str) -> Result<Self> {
         const HINT: &str =
             "an entry has position, and may have name, point_source_id and quaternion_wxyz";
-        let file: FileText = if text.trim_start().starts_with('{') {
+        let file: ScannersFile = if text.trim_start().starts_with('{') {
             serde_json::from_str(text)
                 .map_err(|e| Error::bad_input("wrong JSON").because(e).hint(HINT))?
         } else {
@@ -94,7 +101,7 @@ impl KnownScanners {
     }
 }
 
-impl EntryText {
+impl ScannerText {
     fn check(self) -> Result<KnownScanner> {
         if let Some(bad) = self.position.iter().find(|v| !v.is_finite()) {
             return Err(Error::bad_input(format!("position must be finite, not \"{bad}\"")));

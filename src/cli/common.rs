@@ -1,0 +1,106 @@
+//! Flags of all commands, and what they come to together with configuration and environment.
+
+use super::say::LogFormat;
+use crate::engine::Engine;
+use crate::engine::progress::{Mode, Progress};
+use crate::job::{FlagValues, Means};
+use clap::Args;
+use contract::Result;
+use std::path::PathBuf;
+
+/// Variable of the environment that names a configuration file.
+const CONFIG: &str = "STILLPOINT_CONFIG";
+/// Beginning of the names of variables that hold one setting each.
+const SETTING: &str = "STILLPOINT_SET_";
+
+/// Settings of the environment, sorted by name.
+fn environment() -> Vec<(String, String)> {
+    let text = |(name, value): (std::ffi::OsString, std::ffi::OsString)| {
+        Some((name.into_string().ok()?, value.to_string_lossy().into_owned()))
+    };
+    let all = std::env::vars_os().filter_map(text);
+    let mut own: Vec<_> = all.filter(|(name, _)| name.starts_with(SETTING)).collect();
+    own.sort();
+    own
+}
+
+/// Flags of all commands. `help.rs` hides those that a command does not use.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Common options")]
+pub(super) struct Common {
+    /// Upper bound of resident memory, for example 4GiB
+    #[arg(long, global = true, value_name = "SIZE")]
+    memory: Option<String>,
+    /// Number of worker threads (default: one per core)
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+    /// File of scanner poses (TOML or JSON), for formats without poses
+    #[arg(long, global = true, value_name = "FILE")]
+    scanners: Option<PathBuf>,
+    /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; NAME=UNIT for one file,
+    /// us-ft/m for heights in another unit, several separated by commas (default: what each file
+    /// declares, or metres)
+    #[arg(long, global = true, value_name = "UNIT")]
+    units: Option<String>,
+    /// Configuration file with settings (TOML; default: that of STILLPOINT_CONFIG)
+    #[arg(long, global = true, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// One setting, for example fit.beam=150; takes precedence over the configuration file and over
+    /// variables of the environment (STILLPOINT_SET_FIT_BEAM=150)
+    #[arg(long, global = true, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Method that finds postures: "beam" (default), or "paper", the link-by-link method of the
+    /// paper
+    #[arg(long, global = true, value_name = "NAME")]
+    method: Option<String>,
+    /// How progress is shown (default: a bar on a terminal, lines elsewhere)
+    #[arg(long, global = true, value_enum, value_name = "HOW")]
+    progress: Option<Mode>,
+    /// How warnings and errors are written
+    #[arg(long, global = true, value_enum, value_name = "HOW", default_value = "text")]
+    pub(super) log_format: LogFormat,
+}
+
+impl Common {
+    /// Combines and checks defaults, configuration and flags.
+    pub(super) fn means(&self) -> Result<Means> {
+        let method = self.method.iter().map(|name| format!("fit.method={name}"));
+        let units = self.units.iter().map(|unit| format!("ingest.units=\"{unit}\""));
+        let config = self.config.clone().or_else(|| std::env::var_os(CONFIG).map(PathBuf::from));
+        Means::of(&FlagValues {
+            memory: self.memory.clone(),
+            threads: self.threads,
+            config,
+            environment: environment(),
+            set: self.set.iter().cloned().chain(method).chain(units).collect(),
+        })
+    }
+
+    #[cfg(test)]
+    pub(super) fn threads(&self) -> Option<usize> {
+        self.threads
+    }
+
+    /// The file of scanner poses: that of the flag, else that of the configuration.
+    pub(super) fn scanners(&self, means: &Means) -> Option<PathBuf> {
+        self.scanners.clone().or_else(|| means.scanners.clone())
+    }
+
+    /// An engine that shows progress and reacts to Ctrl-C. It may be created only once.
+    pub(super) fn engine(&self, means: &Means) -> Result<Engine> {
+        let mut engine = Engine::new(means.n_threads);
+        engine.channel_bytes = means.channel_bytes();
+        engine.is_narrow = means.is_narrow();
+        engine.progress = match (self.progress, self.log_format) {
+            // With JSON requested, bars and lines for people are left out.
+            (Some(Mode::None), LogFormat::Json) => Progress::json_without_progress(),
+            (_, LogFormat::Json) => Progress::new(Mode::Json),
+            (mode, LogFormat::Text) => Progress::new(mode.unwrap_or_else(Mode::fitting)),
+        };
+        engine.cancel.on_ctrl_c()?;
+        // Libraries that use rayon by themselves get the same number of threads; a pool that exists
+        // already (in tests) is kept.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
+        Ok(engine)
+    }
+}
