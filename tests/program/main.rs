@@ -11,6 +11,7 @@ mod command_line;
 mod common;
 mod faults;
 mod frames;
+mod guide;
 mod mesh;
 mod moved;
 mod rescan;

@@ -166,7 +166,7 @@ impl Attach {
         let is_fixed = (0..members.len()).map(is_fixed).collect();
         share(&Body {
             graph,
-            from_hand: self.from_hand(graph, voxels, members, &length),
+            from_hand: self.ways_from_hand(graph, voxels, members, &length),
             longest_tool,
             thin: self.settings.thin,
             contact: members.iter().map(contact).collect(),
@@ -178,7 +178,7 @@ impl Attach {
 
     /// For each voxel of a component the way from a hand, where that is about as near as the
     /// nearest link: hoses along the wrist lead to a tool as well.
-    fn from_hand(
+    fn ways_from_hand(
         &self,
         graph: &Graph,
         voxels: &[ResidualVoxel],

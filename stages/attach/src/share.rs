@@ -24,12 +24,12 @@ const LAYER: u32 = 100;
 const N_LAYERS: usize = 3;
 /// Number of layers of voxels behind a cut that may be a part of the tool: 6 cm.
 const N_BESIDE: usize = 3;
-/// Number of layers of voxels behind a cut in which the end of a tool is looked for: the length of a
-/// finger, 10 cm, and that of a thin neck, 40 cm.
+/// Number of layers of voxels behind a cut in which the end of a tool is looked for: the length of
+/// a finger, 10 cm, and that of a thin neck, 40 cm.
 const N_FOLLOWED: usize = 5;
 const N_FOLLOWED_NECK: usize = 20;
-/// Largest number of voxels in a layer of a thin neck, of 6 cm, and how many times longer than thick
-/// it is.
+/// Largest number of voxels in a layer of a thin neck, of 6 cm, and how many times longer than
+/// thick it is.
 const THIN_NECK: usize = 12;
 const NECK_RATIO: f64 = 3.0;
 /// Least number of voxels in a layer of a neck with which what is behind it is compared.

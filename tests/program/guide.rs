@@ -1,10 +1,9 @@
 //! The guide and the README are true: each command of the guide runs, in the order of its pages,
 //! files that the program reads and writes keep to their schemas, and links lead somewhere.
 
-#[path = "guide/schema.rs"]
 mod schema;
 
-use schema::faults;
+use self::schema::faults;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
