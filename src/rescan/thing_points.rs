@@ -89,7 +89,7 @@ impl SessionBeams for MovedPoints<'_> {
 fn gather(
     store: &Store,
     bounds: &[Aabb],
-    map: &(impl Map<In = Tile, Out = GatheredPoints, Scratch = ()> + Sync),
+    map: &impl Map<In = Tile, Out = GatheredPoints, Scratch = ()>,
     engine: &Engine,
 ) -> Result<ThingPoints> {
     let mut tiles: Vec<usize> = bounds.iter().flat_map(|b| store.touching(b)).collect();

@@ -58,20 +58,22 @@ pub(super) struct ShiftsRow {
     pub(super) seconds: f64,
 }
 
+/// Which things a row of the table is about.
+type ShiftClass = (&'static str, fn(&ShiftRow) -> bool);
+
 /// The table, and a line for each thing that is off by more than it should be.
 pub(super) fn table(rows: &[ShiftsRow]) -> String {
     let all: Vec<&ShiftRow> = rows.iter().flat_map(|row| &row.things).collect();
     let mut out = String::from(
         "| sides that each session sees | things | moved | shift stated | determined | error mm: median, 90 %, most | determined: median, 90 %, most | within 3 sigma | turn °: median, 90 % | turn within 3 sigma |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
-    let least = |row: &ShiftRow| row.sides[0].min(row.sides[1]);
-    let classes: [(&str, &dyn Fn(&ShiftRow) -> bool); 6] = [
-        ("one of them none", &|row| least(row) == 0),
-        ("at least one", &|row| least(row) == 1),
-        ("at least two", &|row| least(row) >= 2),
-        ("two, and none of them in both", &|row| least(row) >= 2 && row.sides[2] == 0),
-        ("two, and two of them in both", &|row| least(row) >= 2 && row.sides[2] >= 2),
-        ("all", &|_| true),
+    let classes: [ShiftClass; 6] = [
+        ("one of them none", |row| least(row) == 0),
+        ("at least one", |row| least(row) == 1),
+        ("at least two", |row| least(row) >= 2),
+        ("two, and none of them in both", |row| least(row) >= 2 && row.sides[2] == 0),
+        ("two, and two of them in both", |row| least(row) >= 2 && row.sides[2] >= 2),
+        ("all", |_| true),
     ];
     for (name, is_of) in classes {
         let own: Vec<&ShiftRow> = all.iter().copied().filter(|row| is_of(row)).collect();
@@ -85,6 +87,11 @@ pub(super) fn table(rows: &[ShiftsRow]) -> String {
         rows.len()
     );
     out
+}
+
+/// Number of sides that the session sees which sees fewer.
+fn least(row: &ShiftRow) -> usize {
+    row.sides[0].min(row.sides[1])
 }
 
 fn line(rows: &[&ShiftRow]) -> String {
