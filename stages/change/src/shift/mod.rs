@@ -12,8 +12,10 @@
 //!    of them move alike (`motion`).
 
 mod align;
+mod body;
 pub(crate) mod motion;
 mod points;
+mod scan_set;
 mod search;
 mod slide;
 mod surfels;
@@ -25,9 +27,11 @@ pub use search::SessionBeams;
 
 use crate::occupancy::SessionEvidence;
 use crate::things::{Thing, ThingChange};
+use body::ShownParts;
 use contract::Fan;
 use geometry::Vector;
 use motion::motion;
+use surfels::ThingPoint;
 
 /// Width around the space that a thing takes in both sessions within which its points are kept,
 /// metres: the noise of bounds by voxels.
@@ -37,7 +41,7 @@ const BESIDE: f64 = 0.05;
 /// later session. One task a thing runs on `fan`.
 pub fn find_motions(
     things: &mut [Thing],
-    points: &[ThingPoints; 2],
+    (voxels, points): (&ThingVoxels, &[ThingPoints; 2]),
     beams: &dyn SessionBeams,
     fan: &dyn Fan,
 ) {
@@ -45,13 +49,18 @@ pub fn find_motions(
         (0..things.len()).filter(|&i| things[i].change == ThingChange::Moved).collect();
     let things_then: &[Thing] = things;
     let found = fan.fan(moved.clone(), |i| {
+        let shown = voxels.shown(i);
+        if shown == ShownParts::OfUnknown {
+            return Err(UnknownMotion::PartsOnly);
+        }
         let means = [0, 1].map(|k| {
             let mut means = points[k].means(i);
-            means.retain(|(at, _)| may_have_moved(&things_then[i], k, at, beams));
+            let is_its = |p: &ThingPoint| may_have_moved(&things_then[i], k, &p.at, beams);
+            means.retain(|p| matches!(shown, ShownParts::Of(_)) || is_its(p));
             means
         });
         let sides = means.each_ref().map(|means| surfels::surfels(means));
-        let places = means.map(|means| means.iter().map(|m| m.0).collect::<Vec<Vector>>());
+        let places = means.map(|means| means.iter().map(|m| m.at).collect::<Vec<Vector>>());
         motion(sides, places, beams)
     });
     for (i, found) in moved.into_iter().zip(found) {

@@ -1,11 +1,14 @@
 //! Motions of synthetic things, whose points are cast from stations.
 
 use super::motion::{ThingMotion, UnknownMotion, motion};
+use super::scan_set::ScanSet;
 use super::search::SessionBeams;
-use super::surfels::surfels;
+use super::surfels::{ThingPoint, surfels};
 use crate::occupancy::SessionEvidence;
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
+
+mod on_the_spot;
 
 /// Angle between beams, radians: 0.15°.
 const BEAMS: f64 = 0.0026;
@@ -82,7 +85,7 @@ impl Stage {
     }
 
     /// Points of the first body, thinned as those of a session are, with directions to scanners.
-    fn points(&self) -> Vec<(Vector, Vector)> {
+    fn points(&self) -> Vec<ThingPoint> {
         let (mut sums, mut k) = (std::collections::BTreeMap::new(), 0.0_f64);
         for from in &self.stations {
             let to = self.bodies[0].1.translation.vector - from;
@@ -96,12 +99,15 @@ impl Stage {
                     let noise = ((k * 12.9898).sin() * 43758.5453).fract() * 1.7 * NOISE;
                     let p = from + (range + noise) * along;
                     let cell = [0, 1, 2].map(|c| (p[c] / 0.0125).floor() as i32);
-                    let sum = sums.entry(cell).or_insert((Vector::zeros(), -along, 0.0));
+                    let none = ScanSet::default();
+                    let sum = sums.entry(cell).or_insert((Vector::zeros(), -along, 0.0, none));
                     (sum.0, sum.2) = (sum.0 + p, sum.2 + 1.0);
+                    sum.3 = sum.3.with(ScanSet::of((*from).into()));
                 }
             }
         }
-        sums.into_values().map(|(sum, towards, n)| (sum / n, towards)).collect()
+        let one = |(sum, towards, n, scans)| ThingPoint { at: sum / n, towards, scans };
+        sums.into_values().map(one).collect()
     }
 
     fn passes(&self, place: &Vector) -> bool {
@@ -131,7 +137,7 @@ impl SessionBeams for Both<'_> {
 fn found(then: &Stage, now: &Stage) -> Result<ThingMotion, UnknownMotion> {
     let points = [then.points(), now.points()];
     let sides = points.each_ref().map(|p| surfels(p));
-    motion(sides, points.map(|p| p.iter().map(|p| p.0).collect()), &Both([then, now]))
+    motion(sides, points.map(|p| p.iter().map(|p| p.at).collect()), &Both([then, now]))
 }
 
 /// Error of a motion's shift, and its length over its standard deviation along the main axes.
