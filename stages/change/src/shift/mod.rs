@@ -2,14 +2,15 @@
 //! stated point of the thing, its turn about the vertical, and their uncertainty.
 //!
 //! 1. The points of the thing are gathered from both sessions, thinned (`points`), and get normals
-//!    (`surfels`).
+//!    (`surfels`). Where only parts of it left their old place, the whole body is (`body`).
 //! 2. Turns and places from which to start are aligned, point to plane, where surfaces overlap;
 //!    beams of one session that pass where the other one has the thing count against a motion
 //!    (`search`, `votes`, `align`).
 //! 3. Directions in which the common faces determine nothing are determined by the ends of the
 //!    thing, or are open (`slide`).
 //! 4. Other turns that explain the points as well are named; the stated point is the one that all
-//!    of them move alike (`motion`).
+//!    of them move alike (`motion`). Errors of the places of scans are part of its uncertainty
+//!    (`scan_set`).
 
 mod align;
 mod body;

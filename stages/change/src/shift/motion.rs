@@ -13,8 +13,13 @@ const MIN_SURFELS: usize = 40;
 const MIN_ON: usize = 25;
 /// Least share of the surfels of the side with fewer ones that must have a partner.
 const MIN_SHARE: f64 = 0.12;
-/// Greatest share of the points that beams of the other session may have passed.
-const MAX_THROUGH: f64 = 0.1;
+/// Greatest share of the points that beams of the other session may have passed: with right motions
+/// it is up to 0.02. With 0.1 a pallet of which the sessions saw opposite sides was laid on itself
+/// with half a turn too much.
+const MAX_THROUGH: f64 = 0.05;
+/// Another turn that beams contradict by less than the best one, by this share of the points,
+/// leaves it undecided, however much surface agrees.
+const LESS_THROUGH: f64 = 0.03;
 /// Scores that are worse by less than a share of the best one explain the points as well, where
 /// beams contradict them by less than another share of the points.
 const AS_WELL: [f64; 2] = [0.25, 0.03];
@@ -113,6 +118,13 @@ pub(super) fn motion(
     }
     if !is_common(best) {
         return Err(UnknownMotion::NothingCommon);
+    }
+    let is_freer = |g: &MotionGuess| {
+        let is_other = wrapped(turn(&g.motion) - turn(&best.motion)).abs() > OTHER_TURN;
+        is_other && is_common(g) && g.through + LESS_THROUGH < best.through
+    };
+    if guesses.iter().any(is_freer) {
+        return Err(UnknownMotion::OtherTurns);
     }
     let is_as_good = |g: &MotionGuess, worse: [f64; 2]| {
         let least = (1.0 - worse[0]) * best.score();

@@ -180,6 +180,19 @@ fn two_sides_in_both_sessions_give_millimetres() {
 }
 
 #[test]
+fn of_a_square_box_the_shift_is_stated_and_no_turn() {
+    let (was, is) = (at(0.0, 0.0, 0.4, 10.0), at(0.8, 0.3, 0.4, 95.0));
+    let square = |pose: Pose, x: f64| Stage {
+        bodies: vec![(Body::Box([0.3, 0.3, 0.4]), pose)],
+        stations: vec![Vector::new(x, -3.0, 1.7), Vector::new(x, 3.5, 1.7)],
+    };
+    let found = found(&square(was, -3.0), &square(is, -2.5)).expect("is found");
+    let (error, z) = off(&found, &(is * was.inverse()));
+    assert!(error.norm() < 0.02 && z < 3.0, "{error} {z} {found:?}");
+    assert!(found.turn.is_none() && found.other_turns.is_empty(), "{found:?}");
+}
+
+#[test]
 fn along_a_face_whose_ends_are_hidden_the_shift_is_open() {
     // The stations look through a gap between two boards at the middle of the front.
     let (was, is) = (at(0.0, 0.0, 0.9, 0.0), at(0.1, 1.2, 0.9, 0.0));
