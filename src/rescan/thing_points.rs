@@ -68,7 +68,7 @@ impl MovedPoints<'_> {
             gather(self.past.store, self.voxels.bounds(0), &EarlierOfThings(self), engine)?,
             gather(self.store, self.voxels.bounds(1), &LaterOfThings(self), engine)?,
         ];
-        engine.pool()?.install(|| find_motions(things, &points, self, &AllThreads));
+        engine.pool()?.install(|| find_motions(things, (self.voxels, &points), self, &AllThreads));
         Ok(())
     }
 }

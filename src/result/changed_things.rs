@@ -39,7 +39,8 @@ pub(crate) struct MotionEntry {
     /// Covariance of the shift, m².
     pub(crate) covariance: [[f64; 3]; 3],
     /// Turn about the vertical, counter-clockwise seen from above, degrees, with its standard
-    /// deviation; `null` where the points do not tell, as of a drum.
+    /// deviation; `null` where the points do not tell, as of a drum, or of a box after whose
+    /// quarter turns they fit about as well.
     pub(crate) turn_deg: Option<f64>,
     pub(crate) turn_sigma_deg: Option<f64>,
     /// Other turns with which the thing looks the same, degrees.

@@ -1,10 +1,11 @@
 //! Aligns the surfaces of a thing in two sessions, point to plane in both directions, where both
 //! sessions saw them.
 
+use super::scan_set::{ScanSet, ScanShares};
 use super::surfels::{SurfelIndex, ThingSurfel};
 use geometry::robust::{median, tukey};
 use geometry::{Point, Pose, Vector};
-use nalgebra::{Matrix6, Translation3, UnitQuaternion, Vector6};
+use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector6};
 use rustc_hash::FxHashMap;
 
 /// Least cosine of the normals of two surfels that are the same piece of surface: 37°.
@@ -33,6 +34,8 @@ struct SurfelPair {
     at: Vector,
     /// Share of a measurement that it counts as.
     share: f64,
+    /// The scans that saw the earlier and the later one.
+    scans: [ScanSet; 2],
 }
 
 /// The surfels of a thing in both sessions.
@@ -72,6 +75,17 @@ impl ThingSides {
             own.filter(|s| self.sides[1 - k].nearest(s, reach, SAME_WAY).is_some()).count()
         };
         [n(0, motion), n(1, &back)]
+    }
+
+    /// Covariance of the shift due to the errors of the places of scans, m².
+    pub(super) fn scan_errors(&self, motion: &Pose, reach: f64) -> Matrix3<f64> {
+        let mut shares = [ScanShares::default(), ScanShares::default()];
+        for pair in self.pairs(motion, reach) {
+            for (shares, scans) in shares.iter_mut().zip(pair.scans) {
+                shares.add(scans, &pair.normal, pair.share);
+            }
+        }
+        shares.iter().map(ScanShares::covariance).sum()
     }
 
     fn pairs(&self, motion: &Pose, reach: f64) -> Vec<SurfelPair> {
@@ -125,7 +139,8 @@ impl ThingSides {
 impl SurfelPair {
     fn of(own: &ThingSurfel, other: &ThingSurfel, share: f64) -> Self {
         let normal = (own.normal + other.normal).normalize();
-        Self { distance: normal.dot(&(own.at - other.at)), normal, at: own.at, share }
+        let distance = normal.dot(&(own.at - other.at));
+        Self { distance, normal, at: own.at, share, scans: [own.scans, other.scans] }
     }
 }
 
@@ -133,6 +148,7 @@ pub(super) fn moved(surfel: &ThingSurfel, motion: &Pose) -> ThingSurfel {
     ThingSurfel {
         at: (motion * Point::from(surfel.at)).coords,
         normal: motion.rotation * surfel.normal,
+        ..*surfel
     }
 }
 

@@ -6,22 +6,35 @@ use super::slide::{SettledMotion, settled};
 use super::surfels::ThingSurfel;
 use geometry::{Point, Pose, Vector};
 use nalgebra::{Matrix2, Matrix3, Vector2};
+use std::f64::consts::PI;
 
 /// Fewest surfels of a side for a motion to be searched, and fewest with a partner.
 const MIN_SURFELS: usize = 40;
 const MIN_ON: usize = 25;
 /// Least share of the surfels of the side with fewer ones that must have a partner.
 const MIN_SHARE: f64 = 0.12;
-/// Greatest share of the points that beams of the other session may have passed.
-const MAX_THROUGH: f64 = 0.1;
+/// Greatest share of the points that beams of the other session may have passed: with right motions
+/// it is up to 0.02. With 0.1 a pallet of which the sessions saw opposite sides was laid on itself
+/// with half a turn too much.
+const MAX_THROUGH: f64 = 0.05;
+/// Another turn that beams contradict by less than the best one, by this share of the points,
+/// leaves it undecided, however much surface agrees.
+const LESS_THROUGH: f64 = 0.03;
 /// Scores that are worse by less than a share of the best one explain the points as well, where
 /// beams contradict them by less than another share of the points.
 const AS_WELL: [f64; 2] = [0.25, 0.03];
+/// The same for quarter turns: a wrong one fits the top and one side, and the sides of many things
+/// are nearly as long as one another.
+const TURN_AS_WELL: [f64; 2] = [0.4, 0.04];
+/// Farthest place whose shift is stated because several turns move it alike, as a multiple of the
+/// thing's radius: farther off it is no point of the thing.
+const AT_MOST: f64 = 1.5;
 /// Motions whose turns differ by more than this are other turns, radians: 10°.
 const OTHER_TURN: f64 = 0.175;
-/// Standard deviations of errors that all points of a session share, metres and radians: what is
-/// left of the registration of scans, of which each may see another face.
-const SHARED: [f64; 2] = [0.0025, 0.001];
+/// Standard deviations of errors that all points of a session share beside those of the places of
+/// its scans, metres and radians: scans turned by 0.01° to 0.02° at 5 to 8 m, and surfaces that
+/// beams meet askew.
+const SHARED: [f64; 2] = [0.002, 0.001];
 /// Standard deviation of a turn beyond which nothing is said of it, radians: 15°.
 const OPEN_TURN: f64 = 0.26;
 /// With more other turns than this the thing is round: a square one has three.
@@ -41,7 +54,8 @@ pub struct ThingMotion {
     /// Covariance of the shift, m².
     pub covariance: [[f64; 3]; 3],
     /// Turn about the vertical, counter-clockwise seen from above, and its standard deviation,
-    /// radians; `None` where the points do not tell, as of a drum.
+    /// radians; `None` where the points do not tell, as of a drum, or of a box after whose quarter
+    /// turns they fit about as well.
     pub turn: Option<[f64; 2]>,
     /// Other turns that explain the points as well, radians.
     pub other_turns: Vec<f64>,
@@ -61,6 +75,10 @@ pub enum UnknownMotion {
     NothingCommon,
     /// Beams contradict each motion that fits.
     Contradicted,
+    /// Old and new place overlap in something larger whose ends are not near.
+    PartsOnly,
+    /// Other turns fit about as well, and no point of it moves alike with all of them.
+    OtherTurns,
 }
 
 impl UnknownMotion {
@@ -71,6 +89,8 @@ impl UnknownMotion {
             Self::FewPoints => "one session has too few points of it",
             Self::NothingCommon => "the sessions saw too little of the same sides of it",
             Self::Contradicted => "beams contradict each motion that fits its surfaces",
+            Self::PartsOnly => "only parts of it left their old place",
+            Self::OtherTurns => "other turns of it fit as well",
         }
     }
 }
@@ -99,22 +119,44 @@ pub(super) fn motion(
     if !is_common(best) {
         return Err(UnknownMotion::NothingCommon);
     }
-    let least = (1.0 - AS_WELL[0]) * best.score();
-    let is_as_good = |g: &&MotionGuess| {
-        is_common(g) && g.score() >= least && g.through <= best.through + AS_WELL[1]
+    let is_freer = |g: &MotionGuess| {
+        let is_other = wrapped(turn(&g.motion) - turn(&best.motion)).abs() > OTHER_TURN;
+        is_other && is_common(g) && g.through + LESS_THROUGH < best.through
     };
-    let equals: Vec<SettledMotion> =
-        guesses.iter().filter(is_as_good).map(|g| settled(&pair, g.motion)).collect();
+    if guesses.iter().any(is_freer) {
+        return Err(UnknownMotion::OtherTurns);
+    }
+    let is_as_good = |g: &MotionGuess, worse: [f64; 2]| {
+        let least = (1.0 - worse[0]) * best.score();
+        is_common(g) && g.score() >= least && g.through <= best.through + worse[1]
+    };
+    let equals: Vec<&MotionGuess> = guesses.iter().filter(|g| is_as_good(g, AS_WELL)).collect();
     // Most things are pushed without being turned about.
-    let own = (0..equals.len())
-        .min_by(|&a, &b| turn(&equals[a].motion).abs().total_cmp(&turn(&equals[b].motion).abs()));
+    let size = |k: &usize| turn(&equals[*k].motion).abs();
+    let own = (0..equals.len()).min_by(|a, b| size(a).total_cmp(&size(b)));
     let own = own.ok_or(UnknownMotion::NothingCommon)?;
-    Ok(stated(&pair, &equals, own))
+    let is_rival = |g: &&MotionGuess| {
+        let is_other = is_quarter(&g.motion, &best.motion) && !is_as_good(g, AS_WELL);
+        is_other && is_as_good(g, TURN_AS_WELL)
+    };
+    let rivals = guesses.iter().filter(is_rival);
+    let all = equals.iter().copied().chain(rivals);
+    stated(&pair, &all.map(|g| settled(&pair, g.motion)).collect::<Vec<_>>(), own)
+}
+
+/// Whether the turns of two motions differ by neither nothing nor half a turn, after which a box
+/// looks the same.
+fn is_quarter(a: &Pose, b: &Pose) -> bool {
+    (OTHER_TURN..PI - OTHER_TURN).contains(&wrapped(turn(a) - turn(b)).abs())
 }
 
 /// The statement about the motion `equals[own]`, beside which the others explain the points as
 /// well.
-fn stated(pair: &ThingPair<'_>, equals: &[SettledMotion], own: usize) -> ThingMotion {
+fn stated(
+    pair: &ThingPair<'_>,
+    equals: &[SettledMotion],
+    own: usize,
+) -> Result<ThingMotion, UnknownMotion> {
     let settled = &equals[own];
     let motion = settled.motion;
     let others = || equals.iter().enumerate().filter(|(i, _)| *i != own).map(|(_, e)| &e.motion);
@@ -123,6 +165,9 @@ fn stated(pair: &ThingPair<'_>, equals: &[SettledMotion], own: usize) -> ThingMo
     let is_turn_open = turn_variance.sqrt() > OPEN_TURN || axes.len() > MAX_OTHER_TURNS;
     let at = if !axes.is_empty() {
         let mean = axes.iter().sum::<Vector2<f64>>() / axes.len() as f64;
+        if (mean - pair.middle.xy()).norm() > AT_MOST * pair.radius() {
+            return Err(UnknownMotion::OtherTurns);
+        }
         Vector::new(mean.x, mean.y, pair.middle.z)
     } else if is_turn_open {
         spun_about(settled)
@@ -142,14 +187,17 @@ fn stated(pair: &ThingPair<'_>, equals: &[SettledMotion], own: usize) -> ThingMo
     );
     let mut covariance = s + sw * cross.transpose() + cross * sw.transpose();
     covariance += cross * w * cross.transpose() + Matrix3::identity() * SHARED[0].powi(2);
+    covariance += pair.fine.scan_errors(&motion, super::search::REACH);
     for other in others() {
         let off = (other * at - at) - shift;
         covariance += off * off.transpose() / equals.len() as f64;
     }
+    // Where quarter turns fit about as well, it is not known which one it was.
+    let is_turn_open = is_turn_open || others().any(|other| is_quarter(other, &motion));
     let other_turns = others().map(turn).filter(|t| wrapped(t - turn(&motion)).abs() > OTHER_TURN);
     let n_on = pair.fine.n_on(&motion, super::search::REACH);
     let n = pair.n_surfels();
-    ThingMotion {
+    Ok(ThingMotion {
         at: at.coords.into(),
         shift: shift.into(),
         covariance: covariance.into(),
@@ -157,7 +205,7 @@ fn stated(pair: &ThingPair<'_>, equals: &[SettledMotion], own: usize) -> ThingMo
         other_turns: if is_turn_open { Vec::new() } else { other_turns.collect() },
         open: open(&covariance),
         common: [0, 1].map(|k| n_on[k] as f64 / n[k].max(1) as f64),
-    }
+    })
 }
 
 /// Directions with a large standard deviation, the largest first.

@@ -1,6 +1,9 @@
 //! Gathers the points of things that moved, thinned to one mean a small voxel. Sums are integers,
 //! so that no result depends on the order of the points.
 
+use super::body::ShownParts;
+use super::scan_set::ScanSet;
+use super::surfels::ThingPoint;
 use crate::occupancy::{EDGE, OccupancyCell, SessionOccupancy, around};
 use crate::things::{Thing, ThingChange};
 use geometry::{Aabb, Vector};
@@ -27,6 +30,8 @@ pub struct ThingVoxels {
     of: [FxHashMap<OccupancyCell, Vec<u16>>; 2],
     /// For each session, bounds of the voxels of each thing, world frame, metres.
     bounds: [Vec<Aabb>; 2],
+    /// For each thing, what its changed places are of it.
+    parts: FxHashMap<u16, ShownParts>,
 }
 
 impl ThingVoxels {
@@ -42,8 +47,12 @@ impl ThingVoxels {
             else {
                 continue;
             };
-            let both = then.shared(&now).grown(EDGE);
-            let stays = then.touches(&now);
+            let shown = ShownParts::of(thing, sessions);
+            let (then, now, both, stays) = match shown {
+                ShownParts::Of(body) => (body, body, body.grown(EDGE), true),
+                _ => (then, now, then.shared(&now).grown(EDGE), then.touches(&now)),
+            };
+            out.parts.insert(number, shown);
             let parts = [(then, &thing.gone), (now, &thing.filled)];
             for (k, (bounds, changed)) in parts.into_iter().enumerate() {
                 let [own, other] = [sessions[k], sessions[1 - k]];
@@ -67,6 +76,12 @@ impl ThingVoxels {
     #[must_use]
     pub fn bounds(&self, session: usize) -> &[Aabb] {
         &self.bounds[session]
+    }
+
+    /// What the changed places of a thing are of it.
+    pub(super) fn shown(&self, thing: usize) -> ShownParts {
+        let number = u16::try_from(thing).ok();
+        number.and_then(|n| self.parts.get(&n)).copied().unwrap_or(ShownParts::Whole)
     }
 
     /// Whether a place of a session (world frame, metres) may be on a thing that moved.
@@ -93,6 +108,7 @@ struct ThingPointSums {
     n: u32,
     at: [i64; 3],
     towards: [i64; 3],
+    scans: ScanSet,
 }
 
 /// The points of moved things in one session.
@@ -119,7 +135,8 @@ impl ThingPoints {
         let beam = scanner.map(|s| Vector::from(s) - Vector::from(world));
         let towards = beam.and_then(|b| b.try_normalize(1e-6)).unwrap_or_default();
         let towards = towards.map(|v| (v / DIRECTION_UNIT).round() as i64);
-        let one = ThingPointSums { n: 1, at: [0, 1, 2].map(at), towards: towards.into() };
+        let scans = scanner.map(ScanSet::of).unwrap_or_default();
+        let one = ThingPointSums { n: 1, at: [0, 1, 2].map(at), towards: towards.into(), scans };
         for thing in things {
             self.of.entry(*thing).or_default().entry(cell).or_default().join(&one);
         }
@@ -135,7 +152,7 @@ impl ThingPoints {
 
     /// The mean points of a thing and the mean directions towards their scanners, sorted by small
     /// voxel; world frame, metres.
-    pub(super) fn means(&self, thing: usize) -> Vec<(Vector, Vector)> {
+    pub(super) fn means(&self, thing: usize) -> Vec<ThingPoint> {
         let number = u16::try_from(thing).ok();
         let Some(all) = number.and_then(|number| self.of.get(&number)) else { return Vec::new() };
         let mut cells: Vec<_> = all.iter().collect();
@@ -145,7 +162,11 @@ impl ThingPoints {
                 f64::from(cell[i]) * EDGE / FINER + sums.at[i] as f64 * UNIT / f64::from(sums.n)
             };
             let towards = Vector::from(sums.towards.map(|v| v as f64));
-            (Vector::new(one(0), one(1), one(2)), towards.try_normalize(0.0).unwrap_or_default())
+            ThingPoint {
+                at: Vector::new(one(0), one(1), one(2)),
+                towards: towards.try_normalize(0.0).unwrap_or_default(),
+                scans: sums.scans,
+            }
         };
         cells.into_iter().map(mean).collect()
     }
@@ -161,6 +182,7 @@ impl ThingPoints {
 impl ThingPointSums {
     fn join(&mut self, other: &Self) {
         self.n += other.n;
+        self.scans = self.scans.with(other.scans);
         for i in 0..3 {
             self.at[i] += other.at[i];
             self.towards[i] += other.towards[i];
@@ -210,8 +232,8 @@ mod tests {
         parts.join(gathered(&reversed.copied().collect::<Vec<_>>()));
         assert!(whole == parts, "sums depend on the order");
         let means = whole.means(0);
-        let front: Vec<_> = means.iter().filter(|(at, _)| at.y < 1e-6).collect();
+        let front: Vec<_> = means.iter().filter(|p| p.at.y < 1e-6).collect();
         assert!(front.len() >= 30 * 30);
-        assert!(front.into_iter().all(|(at, towards)| at.x > 0.99 && towards.y < -0.9));
+        assert!(front.into_iter().all(|p| p.at.x > 0.99 && p.towards.y < -0.9));
     }
 }

@@ -122,6 +122,13 @@ impl<'a> ThingPair<'a> {
         self.points.iter().map(Vec::len).sum()
     }
 
+    /// RMS distance of the earlier surfels from their middle in the plan, metres.
+    pub(super) fn radius(&self) -> f64 {
+        let all = &self.fine.sides[0].all;
+        let sum: f64 = all.iter().map(|s| (s.at - self.middle).xy().norm_squared()).sum();
+        (sum / all.len().max(1) as f64).sqrt().max(0.1)
+    }
+
     fn judged(&self, motion: Pose) -> MotionGuess {
         let (n_on, through) = (self.fine.n_on(&motion, REACH), self.n_through(&motion));
         let share = |n: [usize; 2], of: [usize; 2]| {

@@ -65,7 +65,7 @@ fn slide(pair: &ThingPair<'_>, motion: &Pose, along: &dyn Fn(f64) -> Pose) -> Op
 
 /// Determines the weak directions of an aligned motion by the ends of the thing.
 pub(super) fn settled(pair: &ThingPair<'_>, aligned: Pose) -> SettledMotion {
-    let radius = radius(pair);
+    let radius = pair.radius();
     let scale = Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / radius });
     let scaled = Matrix6::from_diagonal(&scale);
     let mut motion = aligned;
@@ -105,12 +105,4 @@ pub(super) fn settled(pair: &ThingPair<'_>, aligned: Pose) -> SettledMotion {
         }
     }
     SettledMotion { motion, about, covariance }
-}
-
-/// RMS distance of the earlier surfels from their middle in the plan, metres.
-fn radius(pair: &ThingPair<'_>) -> f64 {
-    let all = &pair.fine.sides[0].all;
-    let square = |p: &Vector| (p - pair.middle).xy().norm_squared();
-    let sum: f64 = all.iter().map(|s| square(&s.at)).sum();
-    (sum / all.len().max(1) as f64).sqrt().max(0.1)
 }

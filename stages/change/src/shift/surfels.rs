@@ -1,6 +1,7 @@
 //! Gives thinned points of a thing their normals, and finds for a place the nearest of them that
 //! faces the same way.
 
+use super::scan_set::ScanSet;
 use geometry::{Moments, Vector};
 use rustc_hash::FxHashMap;
 
@@ -22,6 +23,19 @@ pub(super) struct ThingSurfel {
     pub(super) at: Vector,
     /// Unit normal towards the scanner.
     pub(super) normal: Vector,
+    /// The scans that saw it.
+    pub(super) scans: ScanSet,
+}
+
+/// A point of a thing, thinned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ThingPoint {
+    /// World frame, metres.
+    pub(super) at: Vector,
+    /// Mean direction towards its scanners.
+    pub(super) towards: Vector,
+    /// The scans that saw it.
+    pub(super) scans: ScanSet,
 }
 
 /// Points by voxels of one edge, metres.
@@ -55,12 +69,12 @@ fn cell(place: &Vector, edge: f64) -> [i32; 3] {
 
 /// Surfels of points with the directions towards their scanners. A point on an edge or on a wire,
 /// and one whose scanner is not known, gives none.
-pub(super) fn surfels(points: &[(Vector, Vector)]) -> Vec<ThingSurfel> {
-    let grids = RADII.map(|r| PlaceGrid::new(points.iter().map(|p| p.0), r));
-    let one = |(at, towards): &(Vector, Vector)| {
+pub(super) fn surfels(points: &[ThingPoint]) -> Vec<ThingSurfel> {
+    let grids = RADII.map(|r| PlaceGrid::new(points.iter().map(|p| p.at), r));
+    let one = |ThingPoint { at, towards, scans }: &ThingPoint| {
         let neighbours = |k: usize| {
             let mut moments = Moments::new(*at);
-            let near = grids[k].near(at).map(|i| &points[i].0);
+            let near = grids[k].near(at).map(|i| &points[i].at);
             near.filter(|p| (*p - at).norm() <= RADII[k]).for_each(|p| moments.add(p));
             moments
         };
@@ -70,8 +84,11 @@ pub(super) fn surfels(points: &[(Vector, Vector)]) -> Vec<ThingSurfel> {
         let is_flat = fit.rms <= MAX_RMS && fit.spread[1] >= MIN_SPREAD;
         let normal = fit.plane.normal;
         let facing = normal.dot(towards);
-        (is_flat && facing != 0.0)
-            .then(|| ThingSurfel { at: *at, normal: facing.signum() * normal })
+        (is_flat && facing != 0.0).then(|| ThingSurfel {
+            at: *at,
+            normal: facing.signum() * normal,
+            scans: *scans,
+        })
     };
     smoothed(&points.iter().filter_map(one).collect::<Vec<_>>())
 }

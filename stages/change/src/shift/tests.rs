@@ -1,11 +1,14 @@
 //! Motions of synthetic things, whose points are cast from stations.
 
 use super::motion::{ThingMotion, UnknownMotion, motion};
+use super::scan_set::ScanSet;
 use super::search::SessionBeams;
-use super::surfels::surfels;
+use super::surfels::{ThingPoint, surfels};
 use crate::occupancy::SessionEvidence;
 use geometry::{Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
+
+mod on_the_spot;
 
 /// Angle between beams, radians: 0.15°.
 const BEAMS: f64 = 0.0026;
@@ -82,7 +85,7 @@ impl Stage {
     }
 
     /// Points of the first body, thinned as those of a session are, with directions to scanners.
-    fn points(&self) -> Vec<(Vector, Vector)> {
+    fn points(&self) -> Vec<ThingPoint> {
         let (mut sums, mut k) = (std::collections::BTreeMap::new(), 0.0_f64);
         for from in &self.stations {
             let to = self.bodies[0].1.translation.vector - from;
@@ -96,12 +99,15 @@ impl Stage {
                     let noise = ((k * 12.9898).sin() * 43758.5453).fract() * 1.7 * NOISE;
                     let p = from + (range + noise) * along;
                     let cell = [0, 1, 2].map(|c| (p[c] / 0.0125).floor() as i32);
-                    let sum = sums.entry(cell).or_insert((Vector::zeros(), -along, 0.0));
+                    let none = ScanSet::default();
+                    let sum = sums.entry(cell).or_insert((Vector::zeros(), -along, 0.0, none));
                     (sum.0, sum.2) = (sum.0 + p, sum.2 + 1.0);
+                    sum.3 = sum.3.with(ScanSet::of((*from).into()));
                 }
             }
         }
-        sums.into_values().map(|(sum, towards, n)| (sum / n, towards)).collect()
+        let one = |(sum, towards, n, scans)| ThingPoint { at: sum / n, towards, scans };
+        sums.into_values().map(one).collect()
     }
 
     fn passes(&self, place: &Vector) -> bool {
@@ -131,7 +137,7 @@ impl SessionBeams for Both<'_> {
 fn found(then: &Stage, now: &Stage) -> Result<ThingMotion, UnknownMotion> {
     let points = [then.points(), now.points()];
     let sides = points.each_ref().map(|p| surfels(p));
-    motion(sides, points.map(|p| p.iter().map(|p| p.0).collect()), &Both([then, now]))
+    motion(sides, points.map(|p| p.iter().map(|p| p.at).collect()), &Both([then, now]))
 }
 
 /// Error of a motion's shift, and its length over its standard deviation along the main axes.
@@ -171,6 +177,19 @@ fn two_sides_in_both_sessions_give_millimetres() {
     let (error, z) = off(&found, &(is * was.inverse()));
     assert!(error.norm() < 0.003 && z < 3.0, "{error} {z} {found:?}");
     assert!(found.covariance[0][0].sqrt() < 0.005, "{found:?}");
+}
+
+#[test]
+fn of_a_square_box_the_shift_is_stated_and_no_turn() {
+    let (was, is) = (at(0.0, 0.0, 0.4, 10.0), at(0.8, 0.3, 0.4, 95.0));
+    let square = |pose: Pose, x: f64| Stage {
+        bodies: vec![(Body::Box([0.3, 0.3, 0.4]), pose)],
+        stations: vec![Vector::new(x, -3.0, 1.7), Vector::new(x, 3.5, 1.7)],
+    };
+    let found = found(&square(was, -3.0), &square(is, -2.5)).expect("is found");
+    let (error, z) = off(&found, &(is * was.inverse()));
+    assert!(error.norm() < 0.02 && z < 3.0, "{error} {z} {found:?}");
+    assert!(found.turn.is_none() && found.other_turns.is_empty(), "{found:?}");
 }
 
 #[test]
