@@ -13,10 +13,9 @@ const BEGINS: u32 = 400;
 /// Least length of a hose, hundredths of a voxel's edge (35 cm): longer than the fingers of a
 /// gripper with a slender part between them.
 const MIN_HOSE: u32 = 1750;
-/// Way from the robot within which a longer hose begins, hundredths of a voxel's edge (20 cm), and
-/// the least length of such a one (60 cm).
-const BEGINS_LATE: u32 = 1000;
-const MIN_LATE_HOSE: u32 = 3000;
+/// Ways from the robot within which a longer hose begins, and how long it is at least, hundredths
+/// of a voxel's edge: 20 cm and 60 cm, or 30 cm and 1.2 m, which legs of benches are not.
+const LATE_HOSES: [(u32, u32); 2] = [(1000, 3000), (1500, 6000)];
 /// Way along such a part to where its direction is measured, hundredths of a voxel's edge: from its
 /// first 4 cm to what is 10 to 14 cm on.
 const BEGIN: u32 = 200;
@@ -95,7 +94,8 @@ impl LatePart {
     fn of(graph: &Graph, length: &[u32], voxels: Vec<usize>) -> Option<Self> {
         let ways = || voxels.iter().map(|k| length[*k]);
         let (begins, ends) = (ways().min()?, ways().max()?);
-        if begins > BEGINS_LATE || ends - begins < MIN_LATE_HOSE {
+        let is_late = |(latest, least): &(u32, u32)| begins <= *latest && ends - begins >= *least;
+        if !LATE_HOSES.iter().any(is_late) {
             return None;
         }
         let mean = |range: std::ops::Range<u32>| {
