@@ -370,6 +370,31 @@ def plot_plants():
     return chart("Robots of whole plants", "%", rows, ["found, right model", "trusted"])
 
 
+def say_at_work():
+    rows = Family("at_work").last()
+    robots, right, wrong = (
+        sum(int(r[k]) for r in rows) for k in ("robots", "right", "wrong_and_trusted")
+    )
+    return [
+        f"Of {robots} robots {right} are found and right, {wrong} wrong and trusted. The median F1 of "
+        f"moving against fixed points is {min(float(r['f1_median']) for r in rows):.4f} or more in each "
+        f"suite, and of all fixed points at most {max(float(r['lost_largest_percent']) for r in rows):.4f} % "
+        "are lost in one case."
+    ]
+
+
+def table_at_work():
+    head = ["suite, library (seed)", "cases", "robots", "right", "trusted", "F1, median", "tenth", "least"]
+    head += ["tools (open)", "carried (open)", "hoses (open)", "lost of one thing, most %"]
+    rows = []
+    for r in Family("at_work").last():
+        shares = [f"{r[k]} ({r[f'{k}_open']})" if r[k] else "" for k in ("tools", "carried", "hoses")]
+        row = [f"{r['suite']}, {r['library']} ({r['seed']})", r["cases"], r["robots"], r["right"]]
+        row += [r["trusted"], r["f1_median"], r["f1_tenth"], r["f1_least"], *shares]
+        rows.append([*row, f"{r['lost_of_one_percent']} ({r['of']})" if r["of"] else "0"])
+    return table(head, rows)
+
+
 def plot_shared_scans():
     by = OrderedDict()
     for r in Family("shared_scans").last():

@@ -1,9 +1,9 @@
-//! What the terminal shows, word for word: each test compares it with a file under
-//! `tests/snapshots`, so that a change of words is seen in a review.
+//! What the terminal shows, word for word: each test compares it with a file under `snapshots`
+//! beside it, so that a change of words is seen in a review.
 //!
-//! After a change that is wanted, `INSTA_UPDATE=always cargo test --test terminal` writes the files
-//! anew. What differs from machine to machine (paths, times, sizes of memory and disk) is replaced
-//! by a word in brackets first.
+//! After a change that is wanted, `INSTA_UPDATE=always cargo test --test program terminal` writes
+//! the files anew. What differs from machine to machine (paths, times, sizes of memory and disk) is
+//! replaced by a word in brackets first.
 
 use std::path::Path;
 use std::process::Command;
