@@ -211,7 +211,8 @@ pub(crate) fn of_run(
     let page = ReportedResult::open(next, files, means, engine).and_then(|result| result.write());
     match page {
         Ok(_) => Ok(Vec::new()),
-        Err(e) if matches!(e.kind(), Kind::Cancelled | Kind::Io) => Err(e),
+        // On a full disk the next run would find a result without its page, and leave it so.
+        Err(e) if matches!(e.kind(), Kind::Cancelled | Kind::Io) || e.is_full_disk() => Err(e),
         Err(e) => Ok(vec![format!("the result has no page: {e}")]),
     }
 }

@@ -78,7 +78,11 @@ impl AtomicFile {
         let file = self.file.take().expect("taken only here and on drop");
         let done = settled.and_then(|()| file.sync_all());
         let done = done.and_then(|()| std::fs::rename(&self.part, &self.path));
-        done.map_err(|e| Error::of_file("file cannot be finished", &self.path, e))?;
+        if let Err(error) = done {
+            // A caller that can do without the file goes on, and must not find a part of it.
+            let _ = std::fs::remove_file(&self.part);
+            return Err(Error::of_file("file cannot be finished", &self.path, error));
+        }
         // The folder is synced, so that the new name survives a power cut. Where folders cannot be
         // opened (Windows), it does so anyway.
         if let Some(folder) = self.path.parent().and_then(|f| File::open(f).ok()) {
@@ -191,5 +195,15 @@ mod tests {
             write(&path.join("no/such"), b"").expect_err("fails").kind(),
             contract::Kind::Io
         );
+    }
+
+    #[test]
+    fn a_file_that_cannot_get_its_name_leaves_nothing() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("report.html");
+        // A folder that is not empty cannot be replaced by a file.
+        std::fs::create_dir_all(path.join("inside")).expect("a folder");
+        assert!(write(&path, b"page").is_err());
+        assert_eq!(std::fs::read_dir(dir.path()).expect("a folder").count(), 1);
     }
 }
