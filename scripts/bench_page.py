@@ -379,7 +379,7 @@ def say_at_work():
         f"Of {robots} robots {right} are found and right, {wrong} wrong and trusted. The median F1 of "
         f"moving against fixed points is {min(float(r['f1_median']) for r in rows):.4f} or more in each "
         f"suite, and of all fixed points at most {max(float(r['lost_largest_percent']) for r in rows):.4f} % "
-        "are lost in one case."
+        "are lost in one case.",
     ]
 
 
