@@ -5,10 +5,10 @@
 use crate::hand::{part_in, tool_on};
 use crate::random::Random;
 use crate::scene::{
-    Anchor, BeamRaster, Building, Column, Cuboid, Fence, FenceFilling, Furniture, Hose, Later,
-    Scene, SceneFloor, Section, StandShape, ToolShape,
+    Anchor, BeamRaster, Column, Cuboid, Fence, FenceFilling, Furniture, Hose, Later, Scene,
+    Section, StandShape, ToolShape,
 };
-use crate::spot::{RobotSpot, scanner};
+use crate::spot::{RobotSpot, bare_hall, scanner};
 use contract::{Error, Result};
 use geometry::Point;
 use robot::{Model, Role};
@@ -63,22 +63,9 @@ pub fn plant(wanted: &Plant, models: &[Model]) -> Result<Scene> {
     }
     let mut random = Random::keyed(&[wanted.seed, 0x91A]);
     let (rooms, size) = rooms(wanted, &robots, &mut random);
-    let mut scene = Scene {
-        seed: wanted.seed,
-        hall: Some(Building {
-            size: [size[0], size[1], random.between(5.0, 8.0)],
-            walls: true,
-            ceiling: random.unit() < 0.7,
-        }),
-        floor: Some(SceneFloor {
-            size: None,
-            tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
-            wave_amplitude: 0.003,
-            wave_length: 5.0,
-            levels: vec![],
-        }),
-        ..Scene::default()
-    };
+    let size_and_height = [size[0], size[1], random.between(5.0, 8.0)];
+    let has_ceiling = random.unit() < 0.7;
+    let mut scene = bare_hall(wanted.seed, size_and_height, has_ceiling, &mut random);
     furnish(&mut scene, wanted, &rooms, size, &mut random);
     for (k, room) in rooms.iter().enumerate() {
         stand(&mut scene, room, k, wanted.moves && k == 0, wanted, &mut random)?;

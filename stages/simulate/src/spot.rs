@@ -1,8 +1,11 @@
-//! Places a robot in a scene that is being built, with a stand and a random posture.
+//! Begins a random scene with a bare hall, and places a robot in it, with a stand and a random
+//! posture.
 
 use crate::posture::Postures;
 use crate::random::Random;
-use crate::scene::{BeamRaster, Mixed, RobotPlace, Scanner, Scene, SceneStand, StandShape};
+use crate::scene::{
+    BeamRaster, Building, Mixed, RobotPlace, Scanner, Scene, SceneFloor, SceneStand, StandShape,
+};
 use crate::solid::cuboid;
 use contract::Result;
 use geometry::Point;
@@ -10,6 +13,28 @@ use robot::Model;
 
 /// Depth below the floor that is allowed for a link, metres.
 const FLOOR_SLACK: f64 = 0.005;
+
+/// A hall with walls and a floor that is nearly level, and nothing in it; `size` holds its sides
+/// and its height, metres.
+pub(crate) fn bare_hall(
+    seed: u64,
+    size: [f64; 3],
+    has_ceiling: bool,
+    random: &mut Random,
+) -> Scene {
+    Scene {
+        seed,
+        hall: Some(Building { size, walls: true, ceiling: has_ceiling }),
+        floor: Some(SceneFloor {
+            size: None,
+            tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
+            wave_amplitude: 0.003,
+            wave_length: 5.0,
+            levels: vec![],
+        }),
+        ..Scene::default()
+    }
+}
 
 /// A scanner with the errors of a good real one.
 pub(crate) fn scanner(name: String, position: [f64; 3], raster: BeamRaster) -> Scanner {

@@ -6,9 +6,9 @@ mod bodies;
 pub use bodies::MovableKind;
 
 use crate::random::Random;
-use crate::scene::{BeamRaster, Building, Cuboid, RegistrationError, Scanner, Scene, SceneFloor};
+use crate::scene::{BeamRaster, Cuboid, RegistrationError, Scanner, Scene};
 use crate::simulator::Simulator;
-use crate::spot::scanner;
+use crate::spot::{bare_hall, scanner};
 use bodies::{parts, placed};
 use contract::{Error, Result};
 use geometry::{Point, Pose, Vector};
@@ -99,18 +99,8 @@ fn one_hall(wanted: &MovedThings, attempt: u64) -> Option<([Scene; 2], Vec<TrueT
     let random = &mut random;
     let [x, y] = [0, 1].map(|i| random.between(HALL[0][i], HALL[1][i]));
     let size = [x, y, random.between(4.5, 6.0)];
-    let mut scene = Scene {
-        seed: wanted.seed,
-        hall: Some(Building { size, walls: true, ceiling: random.unit() < 0.5 }),
-        floor: Some(SceneFloor {
-            size: None,
-            tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
-            wave_amplitude: 0.003,
-            wave_length: 5.0,
-            levels: vec![],
-        }),
-        ..Scene::default()
-    };
+    let has_ceiling = random.unit() < 0.5;
+    let mut scene = bare_hall(wanted.seed, size, has_ceiling, random);
     let mut taken = furniture(&mut scene, size, random);
     let mut scenes = [scene.clone(), scene];
     scenes[1].seed ^= 0x5E55_1045;

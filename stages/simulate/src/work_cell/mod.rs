@@ -12,11 +12,11 @@ use crate::plant::{foot_radius, lowest, reach};
 use crate::posture::Postures;
 use crate::random::Random;
 use crate::scene::{
-    BeamRaster, Building, Cuboid, Fence, FenceFilling, Furniture, RobotPlace, Scene, SceneFloor,
-    SceneStand, StandShape, ToolShape, pose,
+    BeamRaster, Cuboid, Fence, FenceFilling, Furniture, RobotPlace, Scene, SceneStand, StandShape,
+    ToolShape, pose,
 };
 use crate::solid::cuboid;
-use crate::spot::{keep_out, scanner};
+use crate::spot::{bare_hall, keep_out, scanner};
 use contract::{Error, Result};
 use geometry::Point;
 use robot::{Model, Role};
@@ -102,7 +102,8 @@ fn one_cell(wanted: &WorkCell, robots: &[WorkRobot<'_>], attempt: u64) -> Result
     let length = 2.0 * half.iter().sum::<f64>();
     let depth = 2.0 * half.iter().copied().fold(0.0, f64::max);
     let size = [(length + 2.0 * AISLE).max(8.0), (depth + 2.0 * AISLE).max(7.0)];
-    let mut scene = shell(wanted.seed, size, &mut random);
+    let size_and_height = [size[0], size[1], random.between(4.6, 6.0)];
+    let mut scene = bare_hall(wanted.seed, size_and_height, true, &mut random);
     let mut x = -0.5 * length;
     let mut middles = Vec::new();
     for half in &half {
@@ -119,25 +120,6 @@ fn one_cell(wanted: &WorkCell, robots: &[WorkRobot<'_>], attempt: u64) -> Result
     }
     scanners(&mut scene, wanted, size, &mut random);
     Ok(scene)
-}
-
-fn shell(seed: u64, size: [f64; 2], random: &mut Random) -> Scene {
-    Scene {
-        seed,
-        hall: Some(Building {
-            size: [size[0], size[1], random.between(4.6, 6.0)],
-            walls: true,
-            ceiling: true,
-        }),
-        floor: Some(SceneFloor {
-            size: None,
-            tilt_deg: [random.between(-0.1, 0.1), random.between(-0.1, 0.1)],
-            wave_amplitude: 0.003,
-            wave_length: 5.0,
-            levels: vec![],
-        }),
-        ..Scene::default()
-    }
 }
 
 /// Adds what stands around and between the robots.
