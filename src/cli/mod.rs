@@ -1,6 +1,7 @@
 //! The command line: parses the arguments, runs the command and returns the exit code. Results are
 //! written to standard output, everything else to standard error.
 
+mod answer;
 mod bench;
 mod bench_flags;
 mod common;
@@ -20,8 +21,10 @@ mod say;
 mod schema;
 mod simulate;
 
+pub use answer::{Answer, answer};
 use bench_flags::BenchCommand;
 use clap::FromArgMatches;
+pub use common::means_and_engine;
 use contract::{Error, Kind, Result, fence};
 use flags::{Command, Line, RobotsCommand};
 use program_flags::ConfigCommand;
