@@ -1,0 +1,139 @@
+"""The search for robots in points in memory."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _stillpoint
+from ._errors import UsageError
+from ._jobs import Progress, Setting, StrPath, log, paths, settings
+from ._robot import Robot
+
+#: Points of one scanner: N x 3, float32 or float64, world frame, metres.
+Array = NDArray[np.float64] | NDArray[np.float32]
+
+
+def fit(
+    points: Array | Sequence[Array],
+    scanner: ArrayLike | Sequence[ArrayLike | None] | None,
+    model: StrPath | Iterable[StrPath],
+    *,
+    about: Sequence[float] | NDArray[np.float64] | None = None,
+    radius: float = 0.5,
+    calibrate: bool = False,
+    memory: str | None = None,
+    threads: int | None = None,
+    config: StrPath | None = None,
+    set: Mapping[str, Setting] | None = None,
+    method: str | None = None,
+    scratch: StrPath | None = None,
+    progress: Progress | None = None,
+) -> list[Robot]:
+    """Find robots in points in memory, as :func:`stillpoint.run` would in a file of them.
+
+    Parameters
+    ----------
+    points
+        Points of one scanner, or a list with those of each: arrays of N x 3, float32 or float64,
+        world frame, metres. Points that are not finite are passed over. About a map's origin,
+        float32 is too coarse. A part of a scan is enough, as long as it holds the robot with its
+        stand and what is around and behind it: beams that pass prove that nothing is there.
+    scanner
+        Position of the scanner in the world, metres, or a list with that of each array. None where
+        it is not known: then beams prove no free space, and postures are less certain.
+    model
+        Folder of the model, which holds ``robot.urdf`` and its meshes; or several, tools among them.
+    about
+        A place in the world, metres, near the base of the robot: only bases within ``radius`` of it
+        are searched. All that stands in the points is, without it.
+    radius
+        Greatest distance of the base from ``about``, metres.
+    calibrate
+        Also estimate the joint axes of each robot.
+    memory, threads, config, set, method, progress
+        As those of :func:`stillpoint.run`.
+    scratch
+        Folder for temporary files, about as large as the points; that of the system without it.
+
+    Returns
+    -------
+    list of Robot
+        What was found, best explained first. ``entry`` is what ``result.json`` of a run would hold,
+        without the known space around the robot.
+
+    Raises
+    ------
+    UsageError
+        Arrays, positions or settings that cannot be.
+    BadInputError
+        A model that cannot be loaded, or points in which no robot can be recognised.
+    Interrupted
+        Ctrl-C.
+
+    Notes
+    -----
+    The arrays are copied once, 12 bytes a point, before the lock of the interpreter is released.
+    """
+    arrays = list(points) if isinstance(points, (list, tuple)) else [cast(Array, points)]
+    at = _scanners(scanner, len(arrays))
+    named = [(f"array {i}", at[i], _checked(array, i)) for i, array in enumerate(arrays)]
+    place = None if about is None else (_xyz(about, "about"), float(radius))
+    given = {"fit.calibrate": True} if calibrate else {}
+    given |= {} if method is None else {"fit.method": method}  # type: ignore[dict-item]
+    flags = (
+        memory,
+        threads,
+        None if config is None else os.fspath(config),
+        settings({**(set or {}), **given}),
+    )
+    models = [os.path.abspath(one) for one in paths(model)]
+    folder = None if scratch is None else os.fspath(scratch)
+    text = _stillpoint.fit(named, models, place, folder, flags, progress, log.info)
+    return [Robot.of(entry, index) for index, entry in enumerate(json.loads(text))]
+
+
+def _checked(array: Any, index: int) -> NDArray[Any]:
+    """The array in a form that can be read by whole items, copied only where it is not so."""
+    place = f"array {index}"
+    if not isinstance(array, np.ndarray) or array.dtype not in (np.float32, np.float64):
+        kind = getattr(array, "dtype", type(array).__name__)
+        hint = "convert it with numpy.asarray(points, dtype=float)"
+        raise UsageError(f"{place}: points are float32 or float64, not {kind}; {hint}", place, None, hint)
+    if array.ndim != 2 or array.shape[1] != 3:
+        what = f"{place}: points have N rows and 3 columns, not the shape {array.shape}"
+        raise UsageError(what, place, None, "give x, y and z as columns")
+    size = array.dtype.itemsize
+    is_whole = array.flags.aligned and all(stride % size == 0 for stride in array.strides)
+    is_native = array.dtype.isnative
+    return array if is_whole and is_native else np.ascontiguousarray(array, array.dtype.newbyteorder("="))
+
+
+def _scanners(scanner: Any, n: int) -> list[tuple[float, float, float] | None]:
+    """One position, or None, for each of n arrays."""
+    if scanner is None:
+        return [None] * n
+    is_list = isinstance(scanner, (list, tuple)) and not all(
+        isinstance(v, (int, float, np.number)) for v in scanner
+    )
+    if isinstance(scanner, np.ndarray):
+        is_list = scanner.ndim == 2
+    given = list(scanner) if is_list else [scanner]
+    if len(given) != n:
+        what = f"there are {n} arrays and {len(given)} positions of scanners"
+        raise UsageError(what, "scanner", None, "give a position, or None, for each array")
+    return [None if one is None else _xyz(one, "scanner") for one in given]
+
+
+def _xyz(value: Any, name: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(v) for v in value)
+    except (TypeError, ValueError) as error:
+        what = f"{name}: a place is x, y and z in metres, not {value!r}"
+        raise UsageError(what, name, str(error), None) from error
+    return x, y, z
