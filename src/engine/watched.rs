@@ -6,8 +6,8 @@ use super::progress::{Mode, Progress};
 use contract::{Error, Kind, Result, fence};
 use serde_json::Value;
 use std::io::Write;
-use std::sync::Once;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{Once, OnceLock};
 use std::time::Duration;
 
 /// Time between two calls of the watcher: a person who presses Ctrl-C notices no delay.
@@ -49,11 +49,12 @@ impl std::fmt::Debug for Watched {
 /// is cancelled. A panic in the work is an error of kind [`Kind::Bug`] and prints nothing.
 ///
 /// # Errors
-/// That of the work; a thread that cannot be started.
+/// That of the work; a thread that cannot be started; a process that was forked after such work.
 pub fn watched<T: Send>(
     work: impl FnOnce(Watched) -> Result<T> + Send,
     mut watch: impl FnMut(Vec<Told>) -> bool,
 ) -> Result<T> {
+    is_own_process()?;
     keep_panics_quiet();
     let (sender, lines) = mpsc::channel();
     let progress = Progress::to(Mode::Json, Box::new(Lines { sender, line: Vec::new() }));
@@ -80,6 +81,19 @@ pub fn watched<T: Send>(
                 .hint("this is a fault of stillpoint: please report it with its input"))
         })
     })
+}
+
+/// Refuses to work in a process that was forked after work had been done: the threads stayed with
+/// the parent, and work would wait for them for ever.
+fn is_own_process() -> Result<()> {
+    static FIRST: OnceLock<u32> = OnceLock::new();
+    let own = std::process::id();
+    if *FIRST.get_or_init(|| own) == own {
+        return Ok(());
+    }
+    let what = "this process was forked from one in which stillpoint had worked already";
+    Err(Error::new(Kind::Usage, what)
+        .hint("start a new process instead, in Python with multiprocessing.get_context(\"spawn\")"))
 }
 
 /// Panics that are caught here become errors and do not print by themselves; all others, of the

@@ -11,6 +11,7 @@ use crate::units::Units;
 use crate::{sampling, steps};
 use contract::{Attributes, Error, Fan, Format, Kind, Result};
 use geometry::Pose;
+use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Largest number of arrays: scans are told apart by 16 bits in written clouds.
 const MAX_ARRAYS: usize = u16::MAX as usize;
@@ -21,22 +22,21 @@ pub struct ArrayScan {
     name: String,
     /// Whether the origin of the scan frame is the scanner.
     scanner_known: bool,
-    /// Origin of the scan frame in the world, metres; its axes are those of the world.
-    origin: [f64; 3],
+    world_from_scan: Pose,
     /// Scan frame, metres; what is no number stays so, and is dropped when it is read.
     xyz: Vec<[f32; 3]>,
     look: Vec<[f64; 3]>,
 }
 
 impl ArrayScan {
-    /// Takes `n` points of the world, metres, of which `point` gives each. `scanner` is the position
-    /// of their scanner in the world, metres, if it is known.
+    /// Takes `n` points of the world, metres, of which `point` gives each. `scanner` is the pose of
+    /// their scanner in the world, metres, if it is known: rows of rotation and position.
     ///
     /// # Errors
-    /// `BadInput` where there is no point; `Usage` where the position is no number.
+    /// `BadInput` where there is no point; `Usage` where the pose is none.
     pub fn new(
         name: impl Into<String>,
-        scanner: Option<[f64; 3]>,
+        scanner: Option<[[f64; 4]; 3]>,
         n: usize,
         point: impl Fn(usize) -> [f64; 3],
     ) -> Result<Self> {
@@ -44,23 +44,25 @@ impl ArrayScan {
         if n == 0 {
             return Err(Error::bad_input("there are no points in it").at(name));
         }
-        if scanner.is_some_and(|at| at.iter().any(|v| !v.is_finite())) {
-            return Err(Error::new(Kind::Usage, "the scanner's position is no number").at(name));
-        }
+        let scanner = scanner.map(pose).transpose().map_err(|e| e.at(&name))?;
         let is_finite = |p: &[f64; 3]| p.iter().all(|v| v.is_finite());
         let places = PlaceLook::windows(n as u64).flat_map(|first| {
             let first = first as usize;
             first..(first + PlaceLook::IN_WINDOW).min(n)
         });
         let look: Vec<[f64; 3]> = places.map(&point).filter(is_finite).collect();
-        let near = || PlaceLook::new(look.clone(), None).origin;
-        let origin = scanner.unwrap_or_else(near);
+        let near = || {
+            let [x, y, z] = PlaceLook::new(look.clone(), None).origin;
+            Pose::translation(x, y, z)
+        };
+        let world_from_scan = scanner.unwrap_or_else(near);
+        let scan_from_world = world_from_scan.rotation.inverse().to_rotation_matrix();
         let local = |i: usize| {
-            let p = point(i);
-            [0, 1, 2].map(|a| (p[a] - origin[a]) as f32)
+            let from_scanner = Vector3::from(point(i)) - world_from_scan.translation.vector;
+            (scan_from_world * from_scanner).map(|v| v as f32).into()
         };
         let xyz = (0..n).map(local).collect();
-        Ok(Self { name, scanner_known: scanner.is_some(), origin, xyz, look })
+        Ok(Self { name, scanner_known: scanner.is_some(), world_from_scan, xyz, look })
     }
 
     /// Number of points.
@@ -74,6 +76,25 @@ impl ArrayScan {
     pub fn is_empty(&self) -> bool {
         self.xyz.is_empty()
     }
+}
+
+/// Largest deviation of a rotation's matrix from one: poses come with six digits or more.
+const LARGEST_SKEW: f64 = 1e-4;
+
+/// A pose from rows of rotation and position.
+fn pose(rows: [[f64; 4]; 3]) -> Result<Pose> {
+    let turn = Matrix3::from_fn(|i, j| rows[i][j]);
+    let at = Vector3::from_fn(|i, _| rows[i][3]);
+    let skew = (turn * turn.transpose() - Matrix3::identity()).abs().max();
+    // What is no number fails the comparison as well.
+    let is_turn = skew <= LARGEST_SKEW && turn.determinant() > 0.0;
+    if !is_turn || at.iter().any(|v| !v.is_finite()) {
+        let what = "the scanner's pose is no rotation and place";
+        let error = Error::new(Kind::Usage, what);
+        return Err(error.hint("give its position, or world from scan as a matrix of 4 x 4"));
+    }
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+    Ok(Pose::from_parts(Translation3::from(at), turn))
 }
 
 /// Opens arrays as inputs of one scan each: estimates their lattices and checks their scanners.
@@ -110,14 +131,14 @@ struct ArrayReader {
 
 impl ArrayReader {
     fn new(array: ArrayScan, settings: &Settings) -> Result<Self> {
-        let ArrayScan { name, scanner_known, origin, xyz, look } = array;
+        let ArrayScan { name, scanner_known, world_from_scan, xyz, look } = array;
         let n_points = Some(xyz.len() as u64);
         let step = steps::coarse(&look);
         let mut scan = ScanSeed {
             name: name.clone(),
             mask: 0,
             source_id: None,
-            world_from_scan: Pose::translation(origin[0], origin[1], origin[2]),
+            world_from_scan,
             scanner_known,
             stated_bounds: None,
             stated_points: n_points,
@@ -214,6 +235,10 @@ mod tests {
     use contract::{InputId, OneByOne};
 
     fn opened(scanner: Option<[f64; 3]>, points: &[[f64; 3]]) -> Result<Sources> {
+        // A quarter turn about the vertical: the scan's x is the world's y.
+        let turn = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        let row = |at: [f64; 3], i: usize| [turn[i][0], turn[i][1], turn[i][2], at[i]];
+        let scanner = scanner.map(|at| [0, 1, 2].map(|i| row(at, i)));
         let scan = ArrayScan::new("array 0", scanner, points.len(), |i| points[i])?;
         open_arrays(vec![scan], &Settings::default(), &OneByOne)
     }
@@ -232,7 +257,7 @@ mod tests {
         let mut strips = sources.strips(InputId(0), Want::Coordinates).expect("an input");
         let strip = strips.next().expect("a strip").expect("reads");
         assert_eq!((strip.first_place, &strip.place[..]), (0, &[0, 4][..]));
-        assert_eq!(strip.xyz, [[1.0, 0.0, 0.0], [0.0, -2.5, 1.0]]);
+        assert_eq!(strip.xyz, [[0.0, -1.0, 0.0], [-2.5, 0.0, 1.0]]);
         assert!(strips.next().is_none());
         assert!(sources.check_sizes().is_ok());
     }

@@ -3,7 +3,6 @@
 use contract::{Error, Kind, fence};
 use pyo3::prelude::*;
 use std::error::Error as _;
-use std::sync::OnceLock;
 
 /// The exception for an error: a class of `stillpoint._errors` with message, place, cause and way
 /// out.
@@ -29,22 +28,8 @@ pub(crate) fn raised(py: Python<'_>, error: &Error) -> PyErr {
 /// Runs what stands between Python and the program, so that a panic in it is an exception that
 /// `except Exception` catches.
 pub(crate) fn guarded<T>(py: Python<'_>, run: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
-    is_own_process().map_err(|error| raised(py, &error))?;
     fence::fenced(run).unwrap_or_else(|what| {
         let error = Error::new(Kind::Bug, format!("the Python package ended by a panic: {what}"));
         Err(raised(py, &error.hint("this is a fault of stillpoint: please report it")))
     })
-}
-
-/// Refuses to work in a process that was forked after work had been done: the threads stayed with
-/// the parent, and work would wait for them for ever.
-fn is_own_process() -> contract::Result<()> {
-    static FIRST: OnceLock<u32> = OnceLock::new();
-    let own = std::process::id();
-    if *FIRST.get_or_init(|| own) == own {
-        return Ok(());
-    }
-    let what = "this process was forked from one in which stillpoint had worked already";
-    Err(Error::new(Kind::Usage, what)
-        .hint("start processes with multiprocessing.get_context(\"spawn\")"))
 }

@@ -9,8 +9,9 @@ use std::path::PathBuf;
 use stillpoint::arrays::{ArrayScan, ArraysRequest};
 use stillpoint::job::FlagValues;
 
-/// Name, position of the scanner if it is known (world, metres), and points of one scan.
-type GivenScan<'py> = (String, Option<[f64; 3]>, Bound<'py, PyAny>);
+/// Name, pose of the scanner if it is known (world, metres; rows of rotation and position), and
+/// points of one scan.
+type GivenScan<'py> = (String, Option<[[f64; 4]; 3]>, Bound<'py, PyAny>);
 /// Memory, threads, configuration and single settings, as the flags of these names.
 type GivenFlags = (Option<String>, Option<usize>, Option<PathBuf>, Vec<String>);
 
@@ -58,7 +59,7 @@ fn scan((name, scanner, array): GivenScan<'_>) -> Result<ArrayScan> {
 
 fn taken<T: Element + Copy>(
     name: String,
-    scanner: Option<[f64; 3]>,
+    scanner: Option<[[f64; 4]; 3]>,
     array: &Bound<'_, PyArray2<T>>,
     metres: impl Fn(T) -> f64,
 ) -> Result<ArrayScan> {

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import stillpoint
 from conftest import Demo
+from stillpoint._robot import pose
 
 #: Largest difference of joints and positions, radians and metres: arrays are brought to the frame of
 #: their scanner in another order of additions than steps of a file, which may round a coordinate in
@@ -18,13 +19,14 @@ from conftest import Demo
 SAME = 1e-6
 
 
-def scanned(demo: Demo) -> tuple[list[NDArray[np.float64]], list[list[float]]]:
-    """Points of each scanner, and its position."""
+def scanned(demo: Demo) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+    """Points of each scanner, and its pose."""
     las = laspy.read(demo.las)
     stated = tomllib.loads(demo.scanners.read_text())["scanner"]
     xyz, ids = np.asarray(las.xyz), np.asarray(las.point_source_id)
     points = [np.ascontiguousarray(xyz[ids == one["point_source_id"]]) for one in stated]
-    return points, [one["position"] for one in stated]
+    entries = [{"xyz": one["position"], "quat_wxyz": one["quaternion_wxyz"]} for one in stated]
+    return points, [pose(entry) for entry in entries]
 
 
 def test_arrays_give_the_robots_of_a_run_on_the_same_points(
@@ -54,23 +56,31 @@ def test_one_robot_is_found_about_its_place(demo: Demo) -> None:
     (robot,) = stillpoint.fit(near, scanners, model, about=at, radius=0.6)
     np.testing.assert_allclose(robot.base_pose[:3, 3], at, atol=0.005)
     assert not stillpoint.fit(near, scanners, model, about=at + [0.0, 0.0, 30.0])
+    # Positions alone do as well: these scanners stood upright.
+    places = [scanner[:3, 3] for scanner in scanners]
+    (other,) = stillpoint.fit(near, places, model, about=at, radius=0.6)
+    np.testing.assert_allclose(other.base_pose, robot.base_pose, atol=0.002)
 
 
 def test_columns_of_packed_records_are_read_right(demo: Demo) -> None:
     points, scanners = scanned(demo)
-    part, scanner = points[0], scanners[0]
+    known = demo.result.robots[1]
+    at = known.base_pose[:3, 3]
+    part = max((p[np.linalg.norm(p - at, axis=1) < 4.0] for p in points), key=len)
+    scanner = next(s for s, p in zip(scanners, points, strict=True) if part[0] in p)
+    model = demo.robots / known.model
     packed = np.zeros(len(part), np.dtype([("xyz", "<f8", 3), ("kind", "u1")]))
     assert packed.dtype.itemsize == 25
     packed["xyz"] = part
     single = np.zeros(len(part), np.dtype([("xyz", "<f4", 3), ("kind", "u1")]))
     assert single.dtype.itemsize == 13
     single["xyz"] = part
-    models = demo.models
 
     def of(array: Any) -> list[Any]:
-        return [robot.entry for robot in stillpoint.fit(array, scanner, models)]
+        return [robot.entry for robot in stillpoint.fit(array, scanner, model, about=at)]
 
     plain = of(part)
+    assert plain
     assert of(packed["xyz"]) == plain
     assert of(np.asfortranarray(part)) == plain
     assert of(part.astype(">f8")) == plain
@@ -80,7 +90,7 @@ def test_columns_of_packed_records_are_read_right(demo: Demo) -> None:
         from stillpoint import _stillpoint
 
         given = ("array", None, packed["xyz"])
-        _stillpoint.fit([given], [str(models[0])], None, None, (None, None, None, []))
+        _stillpoint.fit([given], [str(model)], None, None, (None, None, None, []))
 
 
 def test_arrays_that_cannot_be_are_refused_by_name(demo: Demo, tmp_path: pathlib.Path) -> None:
@@ -90,8 +100,9 @@ def test_arrays_that_cannot_be_are_refused_by_name(demo: Demo, tmp_path: pathlib
         (good.astype(int), [0, 0, 0], "float64"),
         (np.zeros((300, 4)), [0, 0, 0], "shape"),
         (np.zeros((0, 3)), [0, 0, 0], "no points"),
-        (good, [0, 0], "metres"),
-        (good, [0, 0, np.nan], "no number"),
+        (good, [[0, 0]], "metres"),
+        (good, [0, 0, np.nan], "no rotation and place"),
+        (good, 2 * np.eye(4), "no rotation and place"),
         ([good, good], [[0, 0, 0]], "2 arrays"),
         ([], [], "arrays"),
         (good, [1e9, 0, 0], "scanner"),

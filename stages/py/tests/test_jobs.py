@@ -15,12 +15,14 @@ import pytest
 
 import stillpoint
 from conftest import Demo
+from stillpoint import _stillpoint
 
 #: Longest time between Ctrl-C and the end of a call, seconds: steps look for it between items.
 SOON = 20.0
 
 
 def test_a_run_that_was_done_is_not_done_again(demo: Demo) -> None:
+    stillpoint.run(demo.scans, robots=demo.robots, out=demo.out)
     before = (demo.out / "result.json").stat().st_mtime_ns
     result = stillpoint.run(demo.scans, robots=demo.robots, out=demo.out)
     assert (demo.out / "result.json").stat().st_mtime_ns == before
@@ -78,7 +80,9 @@ def test_inspect_and_plan_answer_as_the_command_line(demo: Demo, tmp_path: pathl
     assert seen["schema"] == "stillpoint.inspect/1"
     assert [len(one["scans"]) for one in seen["inputs"]] == [4, 4]
     plan = stillpoint.plan(demo.scans, robots=demo.robots, out=tmp_path / "out", threads=3)
-    assert plan["threads"] == 3, plan
+    assert plan["n_models"] == 3 and plan["n_points"] == sum(
+        scan["n_points"] for scan in seen["inputs"][0]["scans"]
+    )
     assert not (tmp_path / "out").exists()
 
 
@@ -100,8 +104,15 @@ def test_a_path_is_checked(demo: Demo, tmp_path: pathlib.Path) -> None:
 
 
 def test_a_cell_is_scanned_again(demo: Demo, tmp_path: pathlib.Path) -> None:
+    later = demo.folder / "demo/scene_later.toml"
+    scan = ["simulate", f"--robots={demo.robots}", f"--out={tmp_path / 'later'}", str(later)]
+    _stillpoint.call(scan)
     result = stillpoint.rescan(
-        demo.scans, base=demo.result, out=tmp_path / "again", robot="R3", frame="same"
+        tmp_path / "later/scans.e57",
+        base=demo.result,
+        out=tmp_path / "again",
+        robot=["R3"],
+        frame="same",
     )
     assert [robot.id for robot in result.robots] == ["R1", "R2", "R3"]
     assert result.changes is not None and "robots" in result.changes

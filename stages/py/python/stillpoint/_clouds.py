@@ -68,7 +68,7 @@ class Cloud:
 
         def bad(what: str, hint: str, cause: Exception | None = None) -> BadInputError:
             why = None if cause is None else str(cause)
-            return BadInputError(f"{place}: {what}; {hint}", str(place), why, hint)
+            return BadInputError.of(what, str(place), why, hint)
 
         again = "run the same job again"
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Self
 
 
 class Error(Exception):
@@ -33,6 +34,20 @@ class Error(Exception):
         self.place = place
         self.cause = cause
         self.way_out = way_out
+
+    @classmethod
+    def of(
+        cls,
+        what: str,
+        place: str | None = None,
+        cause: str | None = None,
+        way_out: str | None = None,
+    ) -> Self:
+        """An error with the message that its parts make, as on the command line."""
+        message = what if place is None else f"{place}: {what}"
+        message += "" if cause is None else f" ({cause})"
+        message += "" if way_out is None else f"; {way_out}"
+        return cls(message, place, cause, way_out)
 
     def __str__(self) -> str:
         return str(self.args[0])

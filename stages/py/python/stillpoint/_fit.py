@@ -17,6 +17,7 @@ from ._robot import Robot
 
 #: Points of one scanner: N x 3, float32 or float64, world frame, metres.
 Array = NDArray[np.float64] | NDArray[np.float32]
+Rows = list[list[float]]
 
 
 def fit(
@@ -45,8 +46,9 @@ def fit(
         float32 is too coarse. A part of a scan is enough, as long as it holds the robot with its
         stand and what is around and behind it: beams that pass prove that nothing is there.
     scanner
-        Position of the scanner in the world, metres, or a list with that of each array. None where
-        it is not known: then beams prove no free space, and postures are less certain.
+        Position of the scanner in the world, metres, or its pose (world from scan, 4 x 4), or a list
+        with that of each array. None where it is not known: then beams prove no free space, and
+        postures are less certain. A position is enough unless the scanner leant.
     model
         Folder of the model, which holds ``robot.urdf`` and its meshes; or several, tools among them.
     about
@@ -104,36 +106,52 @@ def _checked(array: Any, index: int) -> NDArray[Any]:
     if not isinstance(array, np.ndarray) or array.dtype not in (np.float32, np.float64):
         kind = getattr(array, "dtype", type(array).__name__)
         hint = "convert it with numpy.asarray(points, dtype=float)"
-        raise UsageError(f"{place}: points are float32 or float64, not {kind}; {hint}", place, None, hint)
+        raise UsageError.of(f"points are float32 or float64, not {kind}", place, None, hint)
     if array.ndim != 2 or array.shape[1] != 3:
-        what = f"{place}: points have N rows and 3 columns, not the shape {array.shape}"
-        raise UsageError(what, place, None, "give x, y and z as columns")
+        what = f"points have N rows and 3 columns, not the shape {array.shape}"
+        raise UsageError.of(what, place, None, "give x, y and z as columns")
     size = array.dtype.itemsize
     is_whole = array.flags.aligned and all(stride % size == 0 for stride in array.strides)
     is_native = array.dtype.isnative
     return array if is_whole and is_native else np.ascontiguousarray(array, array.dtype.newbyteorder("="))
 
 
-def _scanners(scanner: Any, n: int) -> list[tuple[float, float, float] | None]:
-    """One position, or None, for each of n arrays."""
+def _scanners(scanner: Any, n: int) -> list[Rows | None]:
+    """One pose, or None, for each of n arrays: its first three rows."""
     if scanner is None:
         return [None] * n
-    is_list = isinstance(scanner, (list, tuple)) and not all(
-        isinstance(v, (int, float, np.number)) for v in scanner
-    )
-    if isinstance(scanner, np.ndarray):
-        is_list = scanner.ndim == 2
-    given = list(scanner) if is_list else [scanner]
+    # A list of places is told from a place, and one of poses from a pose, by its depth.
+    given = [scanner] if _is_one(scanner) else list(scanner)
     if len(given) != n:
         what = f"there are {n} arrays and {len(given)} positions of scanners"
-        raise UsageError(what, "scanner", None, "give a position, or None, for each array")
-    return [None if one is None else _xyz(one, "scanner") for one in given]
+        raise UsageError.of(what, "scanner", None, "give a position, or None, for each array")
+    return [None if one is None else _rows(one) for one in given]
+
+
+def _is_one(scanner: Any) -> bool:
+    """Whether this is one position or one pose."""
+    try:
+        return np.shape(scanner) in ((3,), (4, 4))
+    except ValueError:
+        # A list with None or with positions and poses.
+        return False
+
+
+def _rows(scanner: Any) -> Rows:
+    """The first three rows of a pose."""
+    if np.shape(scanner) == (4, 4):
+        pose = np.asarray(scanner, float)
+    else:
+        pose = np.eye(4)
+        pose[:3, 3] = _xyz(scanner, "scanner")
+    rows: Rows = pose[:3].tolist()
+    return rows
 
 
 def _xyz(value: Any, name: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(v) for v in value)
     except (TypeError, ValueError) as error:
-        what = f"{name}: a place is x, y and z in metres, not {value!r}"
-        raise UsageError(what, name, str(error), None) from error
+        what = f"a place is x, y and z in metres, not {value!r}"
+        raise UsageError.of(what, name, str(error)) from error
     return x, y, z

@@ -61,7 +61,8 @@ class Labels:
 
     def moving(self) -> NDArray[np.bool_]:
         """Which points move with a robot: links and what hangs on them."""
-        moves: NDArray[np.bool_] = np.isin(self.kind, [KINDS["link"], KINDS["attachment"]])
+        moves: NDArray[np.bool_] = self.kind == KINDS["link"]
+        moves |= self.kind == KINDS["attachment"]
         return moves
 
 
@@ -104,13 +105,13 @@ class Result:
             self.entry: Mapping[str, Any] = json.loads(place.read_text(encoding="utf-8"))
         except OSError as error:
             hint = "give the output folder of a run that has ended"
-            raise BadInputError(f"{place}: it is not there", str(place), str(error), hint) from error
+            raise BadInputError.of("it is not there", str(place), str(error), hint) from error
         except ValueError as error:
             hint = "run the same job again"
-            raise BadInputError(f"{place}: this is not JSON", str(place), str(error), hint) from error
+            raise BadInputError.of("this is not JSON", str(place), str(error), hint) from error
         if not isinstance(self.entry, dict) or self.entry.get("schema") != SCHEMA:
             hint = f"this package reads {SCHEMA}"
-            raise BadInputError(f"{place}: the schema is another", str(place), None, hint)
+            raise BadInputError.of("the schema is another", str(place), None, hint)
         #: The robots; their order is that of the numbers in masks.
         self.robots: tuple[Robot, ...] = tuple(
             Robot.of(entry, index) for index, entry in enumerate(self.entry["robots"])
@@ -142,7 +143,7 @@ class Result:
             if of in (robot.id, robot.index):
                 return robot
         ids = ", ".join(robot.id for robot in self.robots) or "none"
-        raise UsageError(f"the result has no robot {of!r}; it has {ids}", "robot", None, None)
+        raise UsageError.of(f"the result has no robot {of!r}", None, None, f"it has {ids}")
 
     def scan(self, of: str | int | Scan) -> Scan:
         """The scan with a name or an index.
@@ -158,7 +159,7 @@ class Result:
         if len(found) == 1:
             return found[0]
         many = "several scans" if found else "no scan"
-        raise UsageError(f"the result has {many} named {of!r}", "scan", None, "give its index")
+        raise UsageError.of(f"the result has {many} named {of!r}", None, None, "give its index")
 
     def labels(self, scan: str | int | Scan = 0) -> Labels:
         """The mask of a scan, mapped read-only.
@@ -254,8 +255,8 @@ class Result:
         known = self.robot(robot)
         place = self.path / "robots" / known.id / "robot.urdf"
         if not place.is_file():
-            what = f"{place}: there is no URDF of {known.id}, which is {known.verdict}"
-            raise BadInputError(what, str(place), None, None)
+            what = f"there is no URDF of {known.id}, which is {known.verdict}"
+            raise BadInputError.of(what, str(place))
         return Urdf(place, known.base_pose, {**known.joints, **known.passive})
 
     @property
@@ -277,12 +278,11 @@ class Result:
             # An empty array cannot be mapped.
             array = np.load(place, mmap_mode=None if n == 0 else "r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
-            what = f"{place}: it cannot be read ({error})"
-            raise BadInputError(what, str(place), str(error), hint) from error
+            raise BadInputError.of("it cannot be read", str(place), str(error), hint) from error
         wanted = np.dtype(kind).newbyteorder("<")
         if array.dtype != wanted or array.ndim != 1 or n not in (None, len(array)):
-            what = f"{place}: it is not the array that result.json states"
-            raise BadInputError(what, str(place), None, hint)
+            what = "it is not the array that result.json states"
+            raise BadInputError.of(what, str(place), None, hint)
         array.flags.writeable = False
         return array  # type: ignore[no-any-return]
 
@@ -295,5 +295,5 @@ def _kinds(kind: str | int | Iterable[str | int] | None) -> Sequence[int] | None
     for one, number in zip(wanted, numbers, strict=True):
         if number not in KINDS.values():
             known = ", ".join(KINDS)
-            raise UsageError(f"there is no kind {one!r} of points", "kind", None, f"give {known}")
+            raise UsageError.of(f"there is no kind {one!r} of points", None, None, f"give {known}")
     return numbers

@@ -18,7 +18,7 @@ def call(
     """
 
 def fit(
-    scans: Sequence[tuple[str, tuple[float, float, float] | None, NDArray[Any]]],
+    scans: Sequence[tuple[str, Sequence[Sequence[float]] | None, NDArray[Any]]],
     models: Sequence[str],
     about: tuple[tuple[float, float, float], float] | None,
     scratch: str | None,
@@ -26,7 +26,10 @@ def fit(
     progress: Callable[[str, int, int | None], object] | None = None,
     note: Callable[[str], object] | None = None,
 ) -> str:
-    """Find robots in arrays; returns them as JSON, like ``robots`` of ``result.json``."""
+    """Find robots in arrays; returns them as JSON, like ``robots`` of ``result.json``.
+
+    A scan is its name, the first three rows of its pose (world from scan), and its points.
+    """
 
 class LabelledTiles:
     """The spatial tiles of a result with labels."""
