@@ -2,6 +2,7 @@
 
 import dataclasses
 import pathlib
+import shutil
 
 import pytest
 
@@ -38,6 +39,14 @@ class Demo:
     def models(self) -> list[pathlib.Path]:
         return sorted(path for path in self.robots.iterdir() if path.is_dir())
 
+    #: The model of the library `one`.
+    model = "demo_palletiser_2000"
+
+    @property
+    def one(self) -> pathlib.Path:
+        """A library of one model, for tests that want a short run."""
+        return self.folder / "one"
+
     @property
     def out(self) -> pathlib.Path:
         return self.folder / "demo/result"
@@ -52,4 +61,6 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
     folder = tmp_path_factory.mktemp("demo")
     code, *_ = _stillpoint.call(["demo", f"--beams={BEAMS}", f"--out={folder / 'demo'}"])
     assert code == 0
-    return Demo(folder)
+    demo = Demo(folder)
+    shutil.copytree(demo.robots / demo.model, demo.one / demo.model)
+    return demo

@@ -66,8 +66,8 @@ def test_columns_of_packed_records_are_read_right(demo: Demo) -> None:
     points, scanners = scanned(demo)
     known = demo.result.robots[1]
     at = known.base_pose[:3, 3]
-    part = max((p[np.linalg.norm(p - at, axis=1) < 4.0] for p in points), key=len)
-    scanner = next(s for s, p in zip(scanners, points, strict=True) if part[0] in p)
+    near = [p[np.linalg.norm(p - at, axis=1) < 4.0] for p in points]
+    part, scanner = max(zip(near, scanners, strict=True), key=lambda one: len(one[0]))
     model = demo.robots / known.model
     packed = np.zeros(len(part), np.dtype([("xyz", "<f8", 3), ("kind", "u1")]))
     assert packed.dtype.itemsize == 25

@@ -38,7 +38,7 @@ def test_progress_is_told_and_a_thread_may_run(demo: Demo, tmp_path: pathlib.Pat
         results.append(
             stillpoint.run(
                 [demo.scans],
-                robots=demo.robots,
+                robots=demo.one,
                 out=tmp_path / "out",
                 threads=2,
                 set={"export.page": False, "export.tiles": False},
@@ -58,7 +58,7 @@ def test_progress_is_told_and_a_thread_may_run(demo: Demo, tmp_path: pathlib.Pat
     # The lock of the interpreter was free while work went on.
     assert n_turns > 50
     (result,) = results
-    assert [r.joints for r in result.robots] == [r.joints for r in demo.result.robots]
+    assert [robot.model for robot in result.robots if robot.is_trusted] == [demo.model]
     with pytest.raises(stillpoint.BadInputError, match="tiles"):
         result.points("floor")
 
@@ -80,9 +80,8 @@ def test_inspect_and_plan_answer_as_the_command_line(demo: Demo, tmp_path: pathl
     assert seen["schema"] == "stillpoint.inspect/1"
     assert [len(one["scans"]) for one in seen["inputs"]] == [4, 4]
     plan = stillpoint.plan(demo.scans, robots=demo.robots, out=tmp_path / "out", threads=3)
-    assert plan["n_models"] == 3 and plan["n_points"] == sum(
-        scan["n_points"] for scan in seen["inputs"][0]["scans"]
-    )
+    assert plan["n_models"] == 3
+    assert plan["n_points"] == sum(scan.n_points for scan in demo.result.scans)
     assert not (tmp_path / "out").exists()
 
 
@@ -153,7 +152,7 @@ def test_ctrl_c_ends_a_call_and_the_next_one_goes_on(demo: Demo, tmp_path: pathl
         def progress(stage, done, total):
             print(stage, flush=True)
         try:
-            stillpoint.run({str(demo.scans)!r}, robots={str(demo.robots)!r},
+            stillpoint.run({str(demo.scans)!r}, robots={str(demo.one)!r},
                            out={str(tmp_path / "out")!r}, progress=progress)
         except KeyboardInterrupt as error:
             assert isinstance(error, stillpoint.Interrupted), type(error)
@@ -176,8 +175,8 @@ def test_ctrl_c_ends_a_call_and_the_next_one_goes_on(demo: Demo, tmp_path: pathl
     assert child.wait(60) == 0
     assert "interrupted" in rest and time.monotonic() - at < SOON
     assert not (tmp_path / "out/result.json").exists()
-    result = stillpoint.run(demo.scans, robots=demo.robots, out=tmp_path / "out")
-    assert [r.joints for r in result.robots] == [r.joints for r in demo.result.robots]
+    result = stillpoint.run(demo.scans, robots=demo.one, out=tmp_path / "out")
+    assert [robot.model for robot in result.robots if robot.is_trusted] == [demo.model]
 
 
 def _forked(queue: "multiprocessing.Queue[str]", scans: str) -> None:

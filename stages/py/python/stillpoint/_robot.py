@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -79,7 +79,7 @@ class Tool:
     mount: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A robot that was found. Values of joints are radians, or metres for those in ``slides``."""
 
@@ -128,7 +128,12 @@ class Robot:
     #: Its postures in other scans.
     stays: tuple[Robot, ...]
     #: The whole entry of ``result.json``, with what has no field here.
-    entry: Mapping[str, Any] = field(repr=False)
+    entry: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        x, y, z = self.base_pose[:3, 3]
+        at = f"({x:.3f}, {y:.3f}, {z:.3f})"
+        return f"Robot({self.id!r}, {self.model!r}, {self.verdict} at {at} m)"
 
     @property
     def is_trusted(self) -> bool:
