@@ -59,9 +59,9 @@ def compared(demo, turns, program):
     models = [path for path in sorted((demo / "robots").iterdir()) if path.is_dir()]
     positions = [one["position"] for one in scanners]
     for turn in range(turns):
-        start = time.perf_counter()
+        start, cpu = time.perf_counter(), time.process_time()
         stillpoint.fit(arrays, positions, models, threads=2)
-        arrays_took = time.perf_counter() - start
+        mine = (time.perf_counter() - start, time.process_time() - cpu)
         with tempfile.TemporaryDirectory(dir=demo) as folder:
             line = [program, "run", demo / "scans/scans.las", "--robots", demo / "robots",
                     "--scanners", demo / "scans/scanners.toml", "--out", f"{folder}/out",
@@ -69,20 +69,19 @@ def compared(demo, turns, program):
             start = time.perf_counter()
             done = subprocess.run(line, capture_output=True, text=True, check=True)
             took = time.perf_counter() - start
-        fits = until_fits(done.stderr)
-        print(f"turn {turn + 1}: fit {arrays_took:.2f} s; program {took:.2f} s, {fits:.2f} s of it "
-              f"in stages until the fits were there", flush=True)
+        seconds, cpu = until_fits(done.stderr)
+        print(f"turn {turn + 1}: fit {mine[0]:.2f} s ({mine[1]:.2f} s of processors); program {took:.2f} s, "
+              f"until the fits were there {seconds:.2f} s ({cpu:.2f} s of processors)", flush=True)
 
 
 def until_fits(lines):
-    """Seconds of the stages of a run whose work `fit` does as well."""
+    """Seconds, and processor seconds, of the stages of a run whose work `fit` does as well."""
     import json
 
     mine = {"robots", "ingest", "store", "surfaces", "fit", "tools", "calibrate"}
     ends = [json.loads(line) for line in lines.splitlines() if line.startswith("{")]
     ends = [one for one in ends if one.get("event") == "stage_end" and one["stage"] in mine]
-    # Tiles are written while points are read: the two stages overlap where both are there.
-    return sum(one["seconds"] for one in ends)
+    return [sum(one[name] for one in ends) for name in ("seconds", "cpu_seconds")]
 
 
 def main():

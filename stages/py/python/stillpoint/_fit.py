@@ -103,7 +103,8 @@ def fit(
 def _checked(array: Any, index: int) -> NDArray[Any]:
     """The array in a form that can be read by whole items, copied only where it is not so."""
     place = f"array {index}"
-    if not isinstance(array, np.ndarray) or array.dtype not in (np.float32, np.float64):
+    native = array.dtype.newbyteorder("=") if isinstance(array, np.ndarray) else None
+    if native not in (np.dtype(np.float32), np.dtype(np.float64)):
         kind = getattr(array, "dtype", type(array).__name__)
         hint = "convert it with numpy.asarray(points, dtype=float)"
         raise UsageError.of(f"points are float32 or float64, not {kind}", place, None, hint)
@@ -112,8 +113,8 @@ def _checked(array: Any, index: int) -> NDArray[Any]:
         raise UsageError.of(what, place, None, "give x, y and z as columns")
     size = array.dtype.itemsize
     is_whole = array.flags.aligned and all(stride % size == 0 for stride in array.strides)
-    is_native = array.dtype.isnative
-    return array if is_whole and is_native else np.ascontiguousarray(array, array.dtype.newbyteorder("="))
+    whole: NDArray[Any] = array
+    return whole if is_whole and array.dtype.isnative else np.ascontiguousarray(array, native)
 
 
 def _scanners(scanner: Any, n: int) -> list[Rows | None]:
