@@ -2,39 +2,29 @@
 //! the command line, with the answer as a value instead of on the terminal.
 
 use super::flags::Line;
-use super::say::Say;
+use super::say::{CommandAnswer, Say};
 use super::{help, run};
-use crate::engine::Watched;
+use crate::engine::WatchedWork;
 use clap::FromArgMatches;
 use contract::{Error, Kind, Result};
 use std::ffi::OsString;
-
-/// The answer of a command that did not fail.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Answer {
-    /// Exit code: 0, 3 for success in part, 1 for the answer no.
-    pub code: u8,
-    /// What the command prints to standard output.
-    pub text: String,
-    /// Warnings.
-    pub warnings: Vec<String>,
-    /// Further messages: what was used again.
-    pub notes: Vec<String>,
-}
 
 /// Runs a command with these arguments (without the program's name). Nothing is printed, no handler
 /// for Ctrl-C is installed: `watched` cancels, and receives the progress.
 ///
 /// # Errors
 /// Wrong arguments, as `Usage`; the error of the command.
-pub fn answer(args: impl IntoIterator<Item = OsString>, watched: &Watched) -> Result<Answer> {
+pub fn answer(
+    args: impl IntoIterator<Item = OsString>,
+    watched: &WatchedWork,
+) -> Result<CommandAnswer> {
     let args = std::iter::once("stillpoint".into()).chain(args);
     let line = help::command().try_get_matches_from(args);
     let mut line = line.and_then(|found| Line::from_arg_matches(&found)).map_err(|e| usage(&e))?;
     line.common.watched = Some(watched.clone());
     let say = Say::keeping();
     let code = run(&line, &say)?;
-    Ok(Answer { code, ..say.kept() })
+    Ok(CommandAnswer { code, ..say.kept() })
 }
 
 /// What is wrong with the arguments, in the first paragraph of what `clap` says of it.
@@ -50,7 +40,7 @@ mod tests {
     use super::*;
     use crate::engine::watched;
 
-    fn told(args: &[&str]) -> Result<Answer> {
+    fn told(args: &[&str]) -> Result<CommandAnswer> {
         let args: Vec<OsString> = args.iter().map(OsString::from).collect();
         watched(|own| answer(args, &own), |_| true)
     }

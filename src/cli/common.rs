@@ -2,7 +2,7 @@
 
 use super::say::LogFormat;
 use crate::engine::progress::{Mode, Progress};
-use crate::engine::{Engine, Watched};
+use crate::engine::{Engine, WatchedWork};
 use crate::job::{FlagValues, Means};
 use clap::Args;
 use contract::Result;
@@ -61,7 +61,7 @@ pub(super) struct Common {
     pub(super) log_format: LogFormat,
     /// Cancellation and progress of a program that calls the command in its own process.
     #[arg(skip)]
-    pub(super) watched: Option<Watched>,
+    pub(super) watched: Option<WatchedWork>,
 }
 
 impl Common {
@@ -121,7 +121,7 @@ impl Common {
 ///
 /// # Errors
 /// Flags, a configuration or a variable of the environment that cannot be.
-pub fn means_and_engine(flags: FlagValues, watched: &Watched) -> Result<(Means, Engine)> {
+pub fn means_and_engine(flags: FlagValues, watched: &WatchedWork) -> Result<(Means, Engine)> {
     let means = with_environment(flags)?;
     let mut engine = bare_engine(&means);
     engine.progress = watched.progress.clone();

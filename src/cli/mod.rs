@@ -21,13 +21,14 @@ mod say;
 mod schema;
 mod simulate;
 
-pub use answer::{Answer, answer};
+pub use answer::answer;
 use bench_flags::BenchCommand;
 use clap::FromArgMatches;
 pub use common::means_and_engine;
 use contract::{Error, Kind, Result, fence};
 use flags::{Command, Line, RobotsCommand};
 use program_flags::ConfigCommand;
+pub use say::CommandAnswer;
 use say::{LogFormat, Say};
 use std::ffi::OsString;
 

@@ -1,7 +1,6 @@
 //! Output of the program: results on standard output; warnings and errors on standard error, as
 //! text or JSON. All text is quoted (`contract::quote`), so that no name can control a terminal.
 
-use super::answer::Answer;
 use crate::job::Outcome;
 use contract::{Error, Kind, Result, fence, quote};
 use std::io::Write;
@@ -16,11 +15,24 @@ pub(super) enum LogFormat {
     Json,
 }
 
+/// The answer of a command that did not fail.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CommandAnswer {
+    /// Exit code: 0, 3 for success in part, 1 for the answer no.
+    pub code: u8,
+    /// What the command prints to standard output.
+    pub text: String,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Further messages: what was used again.
+    pub notes: Vec<String>,
+}
+
 /// Writes results, warnings and errors.
 pub(super) struct Say {
     format: LogFormat,
     /// What was said so far, where another program is to get it; nothing is printed then.
-    kept: Option<Mutex<Answer>>,
+    kept: Option<Mutex<CommandAnswer>>,
 }
 
 /// A result as JSON, for [`Say::result`].
@@ -41,14 +53,14 @@ impl Say {
     }
 
     /// What was kept.
-    pub(super) fn kept(self) -> Answer {
-        self.kept.map_or_else(Answer::default, |kept| {
+    pub(super) fn kept(self) -> CommandAnswer {
+        self.kept.map_or_else(CommandAnswer::default, |kept| {
             kept.into_inner().unwrap_or_else(PoisonError::into_inner)
         })
     }
 
     /// Whether what is said is kept: `keep` then adds it.
-    fn keeps(&self, keep: impl FnOnce(&mut Answer)) -> bool {
+    fn keeps(&self, keep: impl FnOnce(&mut CommandAnswer)) -> bool {
         let Some(kept) = &self.kept else { return false };
         keep(&mut kept.lock().unwrap_or_else(PoisonError::into_inner));
         true

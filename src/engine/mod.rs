@@ -31,4 +31,4 @@ pub use join::{PipeSender, PipedItems};
 pub(crate) use panic_guard::guarded;
 pub(crate) use runner::AllThreads;
 pub use runner::{CHANNEL_BYTES, Engine, Task};
-pub use watched::{Told, Watched, watched};
+pub use watched::{Told, WatchedWork, watched};

@@ -15,7 +15,7 @@ const EVERY: Duration = Duration::from_millis(50);
 
 /// Cancellation and progress of watched work.
 #[derive(Clone)]
-pub struct Watched {
+pub struct WatchedWork {
     /// Cancellation flag of the work.
     pub cancel: Cancel,
     /// Receives the progress of the work.
@@ -38,9 +38,9 @@ pub enum Told {
     Note(String),
 }
 
-impl std::fmt::Debug for Watched {
+impl std::fmt::Debug for WatchedWork {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Watched").field("cancel", &self.cancel).finish_non_exhaustive()
+        f.debug_struct("WatchedWork").field("cancel", &self.cancel).finish_non_exhaustive()
     }
 }
 
@@ -51,7 +51,7 @@ impl std::fmt::Debug for Watched {
 /// # Errors
 /// That of the work; a thread that cannot be started; a process that was forked after such work.
 pub fn watched<T: Send>(
-    work: impl FnOnce(Watched) -> Result<T> + Send,
+    work: impl FnOnce(WatchedWork) -> Result<T> + Send,
     mut watch: impl FnMut(Vec<Told>) -> bool,
 ) -> Result<T> {
     is_own_process()?;
@@ -59,7 +59,7 @@ pub fn watched<T: Send>(
     let (sender, lines) = mpsc::channel();
     let progress = Progress::to(Mode::Json, Box::new(Lines { sender, line: Vec::new() }));
     let cancel = Cancel::new();
-    let own = Watched { cancel: cancel.clone(), progress };
+    let own = WatchedWork { cancel: cancel.clone(), progress };
     std::thread::scope(|scope| {
         let run = move || fence::fenced(|| work(own));
         let worker = std::thread::Builder::new().name("stillpoint".into()).spawn_scoped(scope, run);
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn a_watcher_is_told_stages_and_may_cancel() {
         let mut all = Vec::new();
-        let work = |own: Watched| {
+        let work = |own: WatchedWork| {
             own.progress.say("hello");
             own.progress.stage("read", Amount::points(30)).add(1, 20, 0);
             while !own.cancel.is_set() {

@@ -5,7 +5,7 @@ use crate::errors::{guarded, raised};
 use contract::Result;
 use pyo3::prelude::*;
 use std::ffi::OsString;
-use stillpoint::engine::{Told, Watched, watched};
+use stillpoint::engine::{Told, WatchedWork, watched};
 
 /// Runs a command of the program with these arguments: `(exit code, output, warnings, notes)`.
 #[pyfunction]
@@ -38,7 +38,7 @@ impl Listener {
     pub(crate) fn hear<T: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(Watched) -> Result<T> + Send,
+        work: impl FnOnce(WatchedWork) -> Result<T> + Send,
     ) -> PyResult<T> {
         let mut raised_here: Option<PyErr> = None;
         let done = py.detach(|| {

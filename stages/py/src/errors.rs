@@ -1,4 +1,4 @@
-//! Errors of the program as exceptions of the Python package, and what may go wrong between the two.
+//! Errors of the program as exceptions of Python, and a fence for panics between the two.
 
 use contract::{Error, Kind, fence};
 use pyo3::prelude::*;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use stillpoint::result::labelled_points::{LabelledPoints, WantedPoints};
 
 /// World coordinates, kinds, robots and links of some points.
-type Columns<'py> = (
+type PointArrays<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray1<u8>>,
     Bound<'py, PyArray1<i16>>,
@@ -41,7 +41,7 @@ impl LabelledTiles {
         at: usize,
         kinds: Option<Vec<u8>>,
         robot: Option<i16>,
-    ) -> PyResult<Columns<'py>> {
+    ) -> PyResult<PointArrays<'py>> {
         guarded(py, || {
             let wanted = WantedPoints { kinds, robot };
             let columns = py.detach(|| self.0.tile(at, &wanted));
