@@ -257,7 +257,9 @@ mod tests {
         let mut strips = sources.strips(InputId(0), Want::Coordinates).expect("an input");
         let strip = strips.next().expect("a strip").expect("reads");
         assert_eq!((strip.first_place, &strip.place[..]), (0, &[0, 4][..]));
-        assert_eq!(strip.xyz, [[0.0, -1.0, 0.0], [-2.5, 0.0, 1.0]]);
+        let wanted = [[0.0, -1.0, 0.0], [-2.5, 0.0, 1.0_f32]];
+        let pairs = strip.xyz.iter().flatten().zip(wanted.iter().flatten());
+        assert!(pairs.clone().count() == 6 && pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-6));
         assert!(strips.next().is_none());
         assert!(sources.check_sizes().is_ok());
     }
