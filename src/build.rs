@@ -9,8 +9,15 @@ fn main() {
     for file in &files {
         println!("cargo:rerun-if-changed={}", file.display());
     }
-    println!("cargo:rerun-if-changed=stages");
-    gather(Path::new("stages"), &mut files);
+    for entry in std::fs::read_dir("stages").into_iter().flatten().flatten() {
+        let path = entry.path();
+        // The Python package is made of this program, and decides nothing of what is computed.
+        if path.ends_with("py") || !path.is_dir() {
+            continue;
+        }
+        println!("cargo:rerun-if-changed={}", path.display());
+        gather(&path, &mut files);
+    }
     // The guide is no code: a page that is written anew needs no new build.
     for entry in std::fs::read_dir("src").into_iter().flatten().flatten() {
         let path = entry.path();

@@ -5,12 +5,13 @@
 //! Rooms import only rooms to their left:
 //!
 //! ```text
-//! engine  io  job  store  cache  detect  label  result  estimate  rescan  check  plan  eval  cli
+//! engine  io  job  store  cache  detect  label  result  estimate  rescan  check  arrays  plan  eval  cli
 //! ```
 //!
 //! Only the command line imports `eval`. `tests/house.rs` holds the order, and that no files import
 //! each other in a circle; `src/ARCHITECTURE.md` says what each room does.
 
+pub mod arrays;
 pub mod cache;
 pub mod check;
 pub mod cli;

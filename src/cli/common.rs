@@ -1,8 +1,8 @@
 //! Flags of all commands, and what they come to together with configuration and environment.
 
 use super::say::LogFormat;
-use crate::engine::Engine;
 use crate::engine::progress::{Mode, Progress};
+use crate::engine::{Engine, WatchedWork};
 use crate::job::{FlagValues, Means};
 use clap::Args;
 use contract::Result;
@@ -59,6 +59,9 @@ pub(super) struct Common {
     /// How warnings and errors are written
     #[arg(long, global = true, value_enum, value_name = "HOW", default_value = "text")]
     pub(super) log_format: LogFormat,
+    /// Cancellation and progress of a program that calls the command in its own process.
+    #[arg(skip)]
+    pub(super) watched: Option<WatchedWork>,
 }
 
 impl Common {
@@ -66,13 +69,12 @@ impl Common {
     pub(super) fn means(&self) -> Result<Means> {
         let method = self.method.iter().map(|name| format!("fit.method={name}"));
         let units = self.units.iter().map(|unit| format!("ingest.units=\"{unit}\""));
-        let config = self.config.clone().or_else(|| std::env::var_os(CONFIG).map(PathBuf::from));
-        Means::of(&FlagValues {
+        with_environment(FlagValues {
             memory: self.memory.clone(),
             threads: self.threads,
-            config,
-            environment: environment(),
+            config: self.config.clone(),
             set: self.set.iter().cloned().chain(method).chain(units).collect(),
+            ..FlagValues::default()
         })
     }
 
@@ -86,21 +88,61 @@ impl Common {
         self.scanners.clone().or_else(|| means.scanners.clone())
     }
 
-    /// An engine that shows progress and reacts to Ctrl-C. It may be created only once.
-    pub(super) fn engine(&self, means: &Means) -> Result<Engine> {
-        let mut engine = Engine::new(means.n_threads);
-        engine.channel_bytes = means.channel_bytes();
-        engine.is_narrow = means.is_narrow();
-        engine.progress = match (self.progress, self.log_format) {
+    /// How a terminal or a log shows progress.
+    fn shown(&self) -> Progress {
+        match (self.progress, self.log_format) {
             // With JSON requested, bars and lines for people are left out.
             (Some(Mode::None), LogFormat::Json) => Progress::json_without_progress(),
             (_, LogFormat::Json) => Progress::new(Mode::Json),
             (mode, LogFormat::Text) => Progress::new(mode.unwrap_or_else(Mode::fitting)),
-        };
-        engine.cancel.on_ctrl_c()?;
-        // Libraries that use rayon by themselves get the same number of threads; a pool that exists
-        // already (in tests) is kept.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
+        }
+    }
+
+    /// An engine that shows progress and reacts to Ctrl-C, or to the program that watches it.
+    /// Without a watcher it may be created only once.
+    pub(super) fn engine(&self, means: &Means) -> Result<Engine> {
+        let mut engine = bare_engine(means);
+        match &self.watched {
+            Some(watched) => {
+                engine.progress = watched.progress.clone();
+                engine.cancel = watched.cancel.clone();
+            }
+            None => {
+                engine.progress = self.shown();
+                engine.cancel.on_ctrl_c()?;
+            }
+        }
         Ok(engine)
     }
+}
+
+/// Settings from flags and the environment, and an engine with them, for a program that calls a
+/// part of this one in its own process and watches it.
+///
+/// # Errors
+/// Flags, a configuration or a variable of the environment that cannot be.
+pub fn means_and_engine(flags: FlagValues, watched: &WatchedWork) -> Result<(Means, Engine)> {
+    let means = with_environment(flags)?;
+    let mut engine = bare_engine(&means);
+    engine.progress = watched.progress.clone();
+    engine.cancel = watched.cancel.clone();
+    Ok((means, engine))
+}
+
+/// Settings from flags and the environment.
+fn with_environment(flags: FlagValues) -> Result<Means> {
+    let named = || std::env::var_os(CONFIG).map(PathBuf::from);
+    let config = flags.config.or_else(named);
+    Means::of(&FlagValues { config, environment: environment(), ..flags })
+}
+
+/// An engine with the threads and memory of these settings, which nobody watches yet.
+fn bare_engine(means: &Means) -> Engine {
+    let mut engine = Engine::new(means.n_threads);
+    engine.channel_bytes = means.channel_bytes();
+    engine.is_narrow = means.is_narrow();
+    // Libraries that use rayon by themselves get the same number of threads; a pool that exists
+    // already (in tests, and of an earlier call) is kept.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(means.n_threads).build_global();
+    engine
 }

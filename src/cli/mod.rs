@@ -1,6 +1,7 @@
 //! The command line: parses the arguments, runs the command and returns the exit code. Results are
 //! written to standard output, everything else to standard error.
 
+mod answer;
 mod bench;
 mod bench_flags;
 mod common;
@@ -20,11 +21,14 @@ mod say;
 mod schema;
 mod simulate;
 
+pub use answer::answer;
 use bench_flags::BenchCommand;
 use clap::FromArgMatches;
+pub use common::means_and_engine;
 use contract::{Error, Kind, Result, fence};
 use flags::{Command, Line, RobotsCommand};
 use program_flags::ConfigCommand;
+pub use say::CommandAnswer;
 use say::{LogFormat, Say};
 use std::ffi::OsString;
 

@@ -4,6 +4,7 @@
 use crate::job::Outcome;
 use contract::{Error, Kind, Result, fence, quote};
 use std::io::Write;
+use std::sync::{Mutex, PoisonError};
 
 /// How warnings and errors are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -14,9 +15,24 @@ pub(super) enum LogFormat {
     Json,
 }
 
+/// The answer of a command that did not fail.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct CommandAnswer {
+    /// Exit code: 0, 3 for success in part, 1 for the answer no.
+    pub code: u8,
+    /// What the command prints to standard output.
+    pub text: String,
+    /// Warnings.
+    pub warnings: Vec<String>,
+    /// Further messages: what was used again.
+    pub notes: Vec<String>,
+}
+
 /// Writes results, warnings and errors.
 pub(super) struct Say {
     format: LogFormat,
+    /// What was said so far, where another program is to get it; nothing is printed then.
+    kept: Option<Mutex<CommandAnswer>>,
 }
 
 /// A result as JSON, for [`Say::result`].
@@ -28,7 +44,26 @@ pub(super) fn json(value: &impl serde::Serialize) -> Result<String> {
 
 impl Say {
     pub(super) fn new(format: LogFormat) -> Self {
-        Self { format }
+        Self { format, kept: None }
+    }
+
+    /// Keeps all results and warnings instead of writing them.
+    pub(super) fn keeping() -> Self {
+        Self { format: LogFormat::Text, kept: Some(Mutex::default()) }
+    }
+
+    /// What was kept.
+    pub(super) fn kept(self) -> CommandAnswer {
+        self.kept.map_or_else(CommandAnswer::default, |kept| {
+            kept.into_inner().unwrap_or_else(PoisonError::into_inner)
+        })
+    }
+
+    /// Whether what is said is kept: `keep` then adds it.
+    fn keeps(&self, keep: impl FnOnce(&mut CommandAnswer)) -> bool {
+        let Some(kept) = &self.kept else { return false };
+        keep(&mut kept.lock().unwrap_or_else(PoisonError::into_inner));
+        true
     }
 
     /// Silences the default panic message: the code that catches a panic reports it in this format.
@@ -47,12 +82,18 @@ impl Say {
 
     /// Writes a result to standard output. A closed pipe is not an error.
     pub(super) fn result(&self, text: &str) {
+        if self.keeps(|kept| kept.text += text) {
+            return;
+        }
         let mut out = std::io::stdout().lock();
         let _ = writeln!(out, "{}", quote::printed(text.trim_end())).and_then(|()| out.flush());
     }
 
     /// Writes bytes that the program made itself to standard output. A closed pipe is not an error.
     pub(super) fn bytes(&self, bytes: &[u8]) {
+        if self.keeps(|kept| kept.text += &String::from_utf8_lossy(bytes)) {
+            return;
+        }
         let mut out = std::io::stdout().lock();
         let _ = out.write_all(bytes).and_then(|()| out.flush());
     }
@@ -62,6 +103,9 @@ impl Say {
     pub(super) fn outcome(&self, outcome: &Outcome) {
         outcome.warnings.iter().chain(&outcome.notes).for_each(|warning| self.warning(warning));
         for piece in &outcome.reused {
+            if self.keeps(|kept| kept.notes.push(format!("used again: {piece}"))) {
+                continue;
+            }
             self.line(&match self.format {
                 LogFormat::Text => format!("used again: {piece}"),
                 LogFormat::Json => {
@@ -74,6 +118,9 @@ impl Say {
 
     /// Writes a warning.
     pub(super) fn warning(&self, text: &str) {
+        if self.keeps(|kept| kept.warnings.push(text.to_owned())) {
+            return;
+        }
         self.line(&match self.format {
             LogFormat::Text => format!("warning: {text}"),
             LogFormat::Json => serde_json::json!({"level": "warning", "message": text}).to_string(),

@@ -22,6 +22,7 @@ pub mod progress;
 mod runner;
 #[cfg(test)]
 mod tests;
+mod watched;
 
 pub use amount::Amount;
 pub use cancel::Cancel;
@@ -30,3 +31,4 @@ pub use join::{PipeSender, PipedItems};
 pub(crate) use panic_guard::guarded;
 pub(crate) use runner::AllThreads;
 pub use runner::{CHANNEL_BYTES, Engine, Task};
+pub use watched::{Told, WatchedWork, watched};

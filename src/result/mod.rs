@@ -8,6 +8,7 @@ pub mod conversion;
 pub(crate) mod copc;
 pub mod distance_export;
 pub mod history;
+pub mod labelled_points;
 pub(crate) mod mesh_build;
 mod mesh_chunks;
 pub mod mesh_export;

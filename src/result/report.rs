@@ -288,6 +288,7 @@ fn format_word(format: Format) -> &'static str {
         Format::Ptx => "ptx",
         Format::Las => "las",
         Format::Laz => "laz",
+        Format::Memory => "memory",
     }
 }
 

@@ -5,16 +5,16 @@ use super::{code, entries, report, root, rust_files};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Rooms of `src/`, and the plan, from the bottom up: each imports only those before it.
-const ORDER: [&str; 14] = [
+const ORDER: [&str; 15] = [
     "engine", "io", "job", "store", "cache", "detect", "label", "result", "estimate", "rescan",
-    "check", "plan", "eval", "cli",
+    "check", "arrays", "plan", "eval", "cli",
 ];
 /// Files that may stand beside the rooms; `build.rs` runs before any of them is compiled.
 const BESIDE: [&str; 4] = ["build.rs", "lib.rs", "main.rs", "plan.rs"];
 /// The room of benches and demo, and the one room that may import it.
 const EDGE: [&str; 2] = ["eval", "cli"];
 /// Stages of which no files import each other in a circle; one that is freed joins the list.
-const FREE: [&str; 23] = [
+const FREE: [&str; 24] = [
     "attach",
     "base_search",
     "baseline",
@@ -31,6 +31,7 @@ const FREE: [&str; 23] = [
     "give_back",
     "ingest",
     "lattice",
+    "py",
     "register",
     "report_page",
     "robot",

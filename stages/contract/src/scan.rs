@@ -15,7 +15,7 @@ pub struct ScanId(pub u32);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct MaskId(pub u32);
 
-/// A point file format that can be read.
+/// The form in which points are given: a file format, or memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Format {
     /// ASTM E2807 (E57).
@@ -26,6 +26,8 @@ pub enum Format {
     Las,
     /// Compressed LAS.
     Laz,
+    /// No file: arrays in memory that another program handed over.
+    Memory,
 }
 
 /// One input file.

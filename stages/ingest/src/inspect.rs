@@ -192,6 +192,7 @@ fn word(format: Format) -> &'static str {
         Format::Ptx => "PTX",
         Format::Las => "LAS",
         Format::Laz => "LAZ",
+        Format::Memory => "memory",
     }
 }
 

@@ -11,6 +11,7 @@ use crate::oddities::Oddities;
 use crate::reader::{
     Extent, FileReading, MaskSeed, RawStrip, Reader, SampledPoint, ScanSeed, Want,
 };
+use crate::sampling;
 use crate::settings::Settings;
 use crate::units::{ReferenceSystem, Units};
 use contract::{Error, Format, Result};
@@ -84,57 +85,16 @@ impl Reader for Las {
     }
 
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>> {
-        /// Positions of the runs of a sample, relative to the length of the scan: each run spans
-        /// several lines of most scanners.
-        const RUNS: [f64; 3] = [0.45, 0.1, 0.8];
-        /// Number of further positions that are tried where points of other scans lie between.
-        const MORE: usize = 16;
-        let (first, last) = self.extents[scan];
-        let span = last + 1 - first.min(last + 1);
-        let starts: Vec<f64> = if span <= n as u64 {
-            vec![0.0]
-        } else {
-            let more = (0..MORE).map(|i| (i as f64 + 0.5) / MORE as f64);
-            RUNS.into_iter().chain(more).collect()
-        };
-        let length = if starts.len() == 1 { n } else { n / RUNS.len() };
-        let mut sample: Vec<SampledPoint> = Vec::new();
-        for (i, share) in starts.into_iter().enumerate() {
-            if sample.len() >= n || (i >= RUNS.len() && sample.len() > n / 2) {
-                break;
-            }
-            let from = first + (span as f64 * share) as u64;
-            let (place, records) = self.records.run(from, length)?;
-            for strip in self.decoder.decode(&records, place, Want::Coordinates) {
-                if strip.scan == scan {
-                    sample.extend(
-                        strip.xyz.into_iter().map(|xyz| SampledPoint { xyz, native: None }),
-                    );
-                }
-            }
-        }
-        sample.truncate(n);
-        Ok(sample)
+        sampling::sample(self.extents[scan], n, |from, length| {
+            let points = self.points_of(scan, from, length)?;
+            Ok(points.into_iter().map(|(_, xyz)| xyz).collect())
+        })
     }
 
     fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
-        /// Number of records that are read at once: a piece of most compressed files.
-        const RUN: u64 = 50_000;
-        let (first, last) = self.extents[scan];
-        let span = (last + 1).saturating_sub(first);
-        let n_runs = span.min(most).div_ceil(RUN);
-        let every = span.min(most).div_ceil(n.max(1) as u64).max(1);
-        let mut out = Vec::new();
-        for run in 0..n_runs {
-            let from = first + (span as f64 * run as f64 / n_runs as f64) as u64;
-            let (place, records) = self.records.run(from, RUN.min(last + 1 - from) as usize)?;
-            for strip in self.decoder.decode(&records, place, Want::Coordinates) {
-                let places = strip.place.iter().map(|p| strip.first_place + u64::from(*p));
-                let own = places.zip(strip.xyz).filter(|_| strip.scan == scan);
-                out.extend(own.filter(|(at, _)| at.is_multiple_of(every)).map(|(_, xyz)| xyz));
-            }
-        }
-        Ok(out)
+        sampling::spread(self.extents[scan], n, most, |from, length| {
+            self.points_of(scan, from, length)
+        })
     }
 
     fn oddities(&self, scan: usize) -> Option<&Oddities> {
@@ -198,6 +158,14 @@ impl Reader for Las {
 }
 
 impl Las {
+    /// The points of a scan among `n` records from a place on, with their places.
+    fn points_of(&self, scan: usize, from: u64, n: usize) -> Result<Vec<(u64, [f32; 3])>> {
+        let (place, records) = self.records.run(from, n)?;
+        let strips = self.decoder.decode(&records, place, Want::Coordinates).into_iter();
+        let own = strips.filter(|strip| strip.scan == scan);
+        Ok(own.flat_map(RawStrip::into_points).collect())
+    }
+
     /// The strips of a run of records; `first` is the place of the first record.
     fn strips_of(&self, records: &[u8], first: u64, want: Want) -> Vec<RawStrip> {
         let runs = records.chunks(self.strip_points * self.records.header.record_len);

@@ -1,14 +1,13 @@
 //! Finds the scans of a LAS or LAZ file: which source id belongs to which known scanner, and where
 //! to put the origin where no scanner is known.
 
-use crate::frame::NO_RETURN;
 use crate::las_header::LasHeader;
 use crate::las_layout::RecordLayout;
 use crate::las_runs::LasRecords;
-use crate::oddities::no_returns_note;
+use crate::place_look::PlaceLook;
 use crate::reader::ScanSeed;
 use crate::settings::Settings;
-use contract::{Error, Kind, Result};
+use contract::Result;
 use geometry::{Aabb, Pose};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -46,19 +45,12 @@ impl Census {
     }
 }
 
-/// Message for scans without scanner position.
-pub(crate) const NO_SCANNER: &str = "the scanner's position is not known: no free-space evidence, so postures are less \
-     certain and wrong ones harder to refuse; give it with --scanners";
-
 /// Largest number of records of which all source ids are read; of larger files only windows are.
 const CENSUS_ALL: u64 = 20_000_000;
 /// Number of windows.
 const CENSUS_WINDOWS: u64 = 512;
 /// Number of records in each window.
 const CENSUS_RECORDS: usize = 512;
-/// A scanner farther than this from the middle of its points was probably given in another frame,
-/// metres.
-const FAR_SCANNER: f64 = 2_000.0;
 
 /// The source ids of a file, from all records or a sample of them.
 #[derive(Default)]
@@ -124,7 +116,7 @@ pub(crate) fn find(
         let census = census(records)?;
         by_source_id(&mut found, scanners, &census, header, &stem, seed);
     }
-    found.scans.iter_mut().try_for_each(|scan| check_place(scan, &look, settings))?;
+    found.scans.iter_mut().try_for_each(|scan| look.check(scan, settings))?;
     Ok(found)
 }
 
@@ -174,60 +166,6 @@ fn by_source_id(
     found.scan_of_source = scan_of_source;
 }
 
-/// Checks the place of a scan, by its scanner where that is known, else by the spread of its
-/// points, and notes what users should know.
-fn check_place(scan: &mut ScanSeed, look: &LasLook, settings: &Settings) -> Result<()> {
-    if scan.scanner_known {
-        let n = look.n_at(scan.world_from_scan.translation.vector);
-        if n > 0 {
-            scan.notes.push(no_returns_note(n, look.points.len()));
-        }
-        return check_distance(scan, look.middle, settings);
-    }
-    let far = look.far_from(scan.world_from_scan.translation.vector, settings.max_range);
-    if far > 0 && far == look.points.len() {
-        let what = format!(
-            "none of {far} points looked at lies within {} km of their middle, \"{:?}\"",
-            settings.max_range / 1000.0,
-            look.origin
-        );
-        return Err(Error::bad_input(what)
-            .hint("the file is damaged, or its unit is another: give it with --units"));
-    }
-    if far > 0 {
-        scan.notes.push(format!(
-            "{far} of {} points looked at lie more than {} km from the middle: such points are dropped",
-            look.points.len(),
-            settings.max_range / 1000.0
-        ));
-    }
-    scan.notes.push(NO_SCANNER.into());
-    Ok(())
-}
-
-fn check_distance(
-    scan: &mut ScanSeed,
-    middle: Option<[f64; 3]>,
-    settings: &Settings,
-) -> Result<()> {
-    let Some(middle) = middle else { return Ok(()) };
-    let distance =
-        (nalgebra::Vector3::from(middle) - scan.world_from_scan.translation.vector).norm();
-    if distance > settings.max_range {
-        return Err(Error::new(
-            Kind::Usage,
-            format!("the scanner \"{}\" lies {distance:.0} m from its points", scan.name),
-        )
-        .hint("give its position in the same frame as the points"));
-    }
-    if distance > FAR_SCANNER {
-        scan.notes.push(format!(
-            "the scanner lies {distance:.0} m from the middle of the points: check that its position is in their frame"
-        ));
-    }
-    Ok(())
-}
-
 /// The stated bounds with a margin, since writers round them by up to a tenth of a unit.
 pub(crate) fn grown(bounds: &Aabb, header: &LasHeader) -> Aabb {
     let size = bounds.size();
@@ -235,68 +173,20 @@ pub(crate) fn grown(bounds: &Aabb, header: &LasHeader) -> Aabb {
     bounds.grown(0.01 * size[0].max(size[1]).max(size[2]) + 2.0 * scale)
 }
 
-/// The place of a scan's points, from a sample of records.
-struct LasLook {
-    /// World coordinates, metres.
-    points: Vec<[f64; 3]>,
-    /// Number of these points outside the stated bounds.
-    outside: usize,
-    /// Median of these points, metres.
-    middle: Option<[f64; 3]>,
-    /// Origin to use where no scanner is known: whole metres near the median.
-    origin: [f64; 3],
-}
-
-impl LasLook {
-    fn bounds_wrong(&self) -> bool {
-        self.outside * 2 > self.points.len()
-    }
-
-    /// Number of these points that lie at a scanner itself.
-    fn n_at(&self, scanner: nalgebra::Vector3<f64>) -> usize {
-        let is_at = |p: &&[f64; 3]| (0..3).all(|a| (p[a] - scanner[a]).abs() < NO_RETURN);
-        self.points.iter().filter(is_at).count()
-    }
-
-    fn far_from(&self, origin: nalgebra::Vector3<f64>, max_range: f64) -> usize {
-        let far = |p: &[f64; 3]| (0..3).any(|a| (p[a] - origin[a]).abs() > max_range);
-        self.points.iter().filter(|p| far(p)).count()
-    }
-}
-
-fn look(records: &LasRecords) -> Result<LasLook> {
-    const WINDOWS: u64 = 8;
-    const IN_WINDOW: usize = 256;
+fn look(records: &LasRecords) -> Result<PlaceLook> {
     let header = &records.header;
     let mut points = Vec::new();
     let mut starts = Vec::new();
-    for window in 0..WINDOWS {
-        let first = header.n_points * window / WINDOWS;
-        if header.n_points == 0 || starts.contains(&records.start(first)) {
+    for first in PlaceLook::windows(header.n_points) {
+        if starts.contains(&records.start(first)) {
             continue;
         }
         starts.push(records.start(first));
-        let (_, run) = records.run(first, IN_WINDOW)?;
+        let (_, run) = records.run(first, PlaceLook::IN_WINDOW)?;
         let world = run.chunks_exact(header.record_len).map(|r| world(r, header));
         points.extend(world.filter(|p| p.iter().all(|v| v.is_finite())));
     }
-    let bounds = header.bounds.as_ref().map(|b| grown(b, header));
-    let outside =
-        points.iter().filter(|p| !bounds.as_ref().is_some_and(|b| b.contains(**p))).count();
-    let middle = (!points.is_empty()).then(|| {
-        [0, 1, 2].map(|a| {
-            let mut values: Vec<f64> = points.iter().map(|p| p[a]).collect();
-            values.sort_by(f64::total_cmp);
-            values[values.len() / 2]
-        })
-    });
-    let mut look = LasLook { points, outside, middle, origin: [0.0; 3] };
-    let stated = header.bounds.filter(|_| !look.bounds_wrong()).map(|b| {
-        let center = b.center();
-        [center.x, center.y, center.z]
-    });
-    look.origin = stated.or(middle).unwrap_or_default().map(f64::round);
-    Ok(look)
+    Ok(PlaceLook::new(points, header.bounds.map(|stated| (stated, grown(&stated, header)))))
 }
 
 fn world(record: &[u8], header: &LasHeader) -> [f64; 3] {

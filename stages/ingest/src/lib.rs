@@ -24,6 +24,7 @@
 #![deny(unsafe_code)]
 
 mod angular_grid;
+mod arrays;
 mod bounds;
 #[cfg(test)]
 mod check;
@@ -45,6 +46,7 @@ mod looked;
 mod map;
 mod oddities;
 mod picture;
+mod place_look;
 mod poses;
 mod position;
 mod ptx;
@@ -53,6 +55,7 @@ mod raster_free;
 mod raster_native;
 mod reader;
 mod regular;
+mod sampling;
 mod scanners;
 mod settings;
 mod size;
@@ -61,6 +64,7 @@ mod steps;
 mod text;
 mod units;
 
+pub use arrays::{ArrayScan, open_arrays};
 pub use glance::{Glance, GlanceSample};
 pub use inspect::{
     BoundsText, Fact, InputDescription, LatticeText, PoseText, ScanDescription, describe,

@@ -79,6 +79,14 @@ pub(crate) struct RawStrip {
     pub(crate) attributes: Option<Attributes>,
 }
 
+impl RawStrip {
+    /// The points with their places.
+    pub(crate) fn into_points(self) -> impl Iterator<Item = (u64, [f32; 3])> {
+        let first = self.first_place;
+        self.place.into_iter().map(move |place| first + u64::from(place)).zip(self.xyz)
+    }
+}
+
 /// Iterator over the strips of one file, in file order.
 pub(crate) type RawStrips<'a> = Box<dyn Iterator<Item = Result<RawStrip>> + Send + 'a>;
 

@@ -15,6 +15,7 @@ use crate::units::{Choice, ReferenceSystem, Units};
 use contract::{
     Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
 };
+use geometry::Pose;
 use std::path::{Path, PathBuf};
 
 /// Iterator over the strips of one input, in file order.
@@ -263,14 +264,35 @@ impl Sources {
         }
         let meta = std::fs::metadata(path)?;
         let reader = open_file(path, poses, settings)?;
+        let file = self.take(path.to_owned(), meta.len(), reader, |name| poses.by_scan_name(name));
+        self.files.push(file);
+        Ok(())
+    }
+
+    /// No inputs yet.
+    pub(crate) fn empty() -> Self {
+        let (inputs, masks, scans) = (Vec::new(), Vec::new(), Vec::new());
+        let (warnings, files, n_before) = (Vec::new(), Vec::new(), [0, 0]);
+        Self { inputs, masks, scans, warnings, files, n_before }
+    }
+
+    /// Adds an input whose reader states all that is known of its scans.
+    pub(crate) fn add_reader(&mut self, name: PathBuf, n_bytes: u64, reader: Box<dyn Reader>) {
+        let file = self.take(name, n_bytes, reader, |_| None);
+        self.files.push(file);
+    }
+
+    /// Numbers masks and scans of an input; `pose` gives the pose that the user states for a scan.
+    fn take(
+        &mut self,
+        path: PathBuf,
+        n_bytes: u64,
+        reader: Box<dyn Reader>,
+        mut pose: impl FnMut(&str) -> Option<Pose>,
+    ) -> OpenFile {
         let id = InputId(self.inputs.len() as u32);
         let (first_scan, first_mask) = (self.scans.len() as u32, self.masks.len() as u32);
-        self.inputs.push(Input {
-            id,
-            path: path.to_owned(),
-            format: reader.format(),
-            n_bytes: meta.len(),
-        });
+        self.inputs.push(Input { id, path, format: reader.format(), n_bytes });
         for (i, mask) in reader.masks().iter().enumerate() {
             self.masks.push(Mask {
                 id: MaskId(first_mask + i as u32),
@@ -283,16 +305,15 @@ impl Sources {
         let spreads = Vec::new();
         let mut file = OpenFile { reader, first_scan, first_mask, moved, known, steps, spreads };
         for i in 0..file.reader.scans().len() {
-            let scan = self.scan(id, &mut file, i, poses);
+            let scan = scan_of(id, &mut file, i, &mut pose);
             self.scans.push(scan);
         }
-        self.files.push(file);
-        Ok(())
+        file
     }
 
     /// Samples each scan to estimate its raster and to check whether the scanner can have stood at
     /// its stated position.
-    fn find_lattices(&mut self, settings: &Settings, fan: &dyn Fan) -> Result<()> {
+    pub(crate) fn find_lattices(&mut self, settings: &Settings, fan: &dyn Fan) -> Result<()> {
         let n_scans = |file: &OpenFile| file.reader.scans().len();
         let all = (self.files.iter().enumerate())
             .flat_map(|(f, file)| (0..n_scans(file)).map(move |i| (f, i)))
@@ -318,34 +339,39 @@ impl Sources {
         }
         Ok(())
     }
+}
 
-    /// A scan of a file, still without lattice.
-    fn scan(&self, input: InputId, file: &mut OpenFile, i: usize, poses: &mut Poses<'_>) -> Scan {
-        let seed = &file.reader.scans()[i];
-        let mut scan = Scan {
-            id: ScanId(file.first_scan + i as u32),
-            input,
-            mask: MaskId(file.first_mask + seed.mask as u32),
-            name: seed.name.clone(),
-            source_id: seed.source_id,
-            world_from_scan: seed.world_from_scan,
-            lattice: None,
-            stated_bounds: seed.stated_bounds,
-            stated_points: seed.stated_points,
-            notes: seed.notes.clone(),
-        };
-        let replaced = match file.reader.format() {
-            Format::Las | Format::Laz => None,
-            Format::E57 | Format::Ptx => poses.by_scan_name(&seed.name),
-        };
-        file.known.push(seed.scanner_known || replaced.is_some());
-        file.moved.push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
-        if let Some(pose) = replaced {
-            scan.world_from_scan = pose;
-            scan.notes.push("the scanner's position is that of --scanners, not of the file".into());
-        }
-        scan
+/// A scan of a file, still without lattice. LAS poses are in the file's own scans already.
+fn scan_of(
+    input: InputId,
+    file: &mut OpenFile,
+    i: usize,
+    pose: &mut impl FnMut(&str) -> Option<Pose>,
+) -> Scan {
+    let seed = &file.reader.scans()[i];
+    let mut scan = Scan {
+        id: ScanId(file.first_scan + i as u32),
+        input,
+        mask: MaskId(file.first_mask + seed.mask as u32),
+        name: seed.name.clone(),
+        source_id: seed.source_id,
+        world_from_scan: seed.world_from_scan,
+        lattice: None,
+        stated_bounds: seed.stated_bounds,
+        stated_points: seed.stated_points,
+        notes: seed.notes.clone(),
+    };
+    let replaced = match file.reader.format() {
+        Format::Las | Format::Laz | Format::Memory => None,
+        Format::E57 | Format::Ptx => pose(&seed.name),
+    };
+    file.known.push(seed.scanner_known || replaced.is_some());
+    file.moved.push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
+    if let Some(pose) = replaced {
+        scan.world_from_scan = pose;
+        scan.notes.push("the scanner's position is that of --scanners, not of the file".into());
     }
+    scan
 }
 
 impl Weigh for InputPiece {
@@ -369,5 +395,6 @@ fn open_file(path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<
         Format::E57 => crate::e57::open(path, settings),
         Format::Ptx => crate::ptx::open(path, settings),
         Format::Las | Format::Laz => Ok(Box::new(Las::open(path, &poses.of_las(path), settings)?)),
+        Format::Memory => Err(Error::new(Kind::Bug, "a file was taken for memory")),
     }
 }
