@@ -24,6 +24,7 @@ pub(crate) use manifest::sealed;
 pub(crate) use manifest::{EXPORT, PAGE, RESULT, copc_name, tiles_of};
 pub use manifest::{Manifest, OutputFile, Verification, check};
 pub use output::OutputDir;
+pub(crate) use output::settle_folder;
 pub(crate) use pieces::{Cache, read, reused_in_words, written};
 pub(crate) use publish::WholeResult;
 pub(crate) use verified::{VerifiedFiles, result_of};

@@ -6,6 +6,7 @@ use contract::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// File name extension of a file that is not complete.
 pub const PART: &str = "part";
@@ -33,11 +34,15 @@ impl AtomicFile {
     /// If folder or file cannot be created.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
+        let part = part_of(&path);
+        Self::open(path, part)
+    }
+
+    fn open(path: PathBuf, part: PathBuf) -> Result<Self> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)
                 .map_err(|e| Error::of_file("folder cannot be created", folder, e))?;
         }
-        let part = part_of(&path);
         let file = OpenOptions::new()
             .create(true)
             .read(true)
@@ -122,6 +127,30 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.write_all(bytes).map_err(|e| Error::of_file("file cannot be written", path, e))?;
     file.commit()
+}
+
+/// Like [`write`], for a file that several processes, perhaps of several machines, may write at
+/// once: each writes under a temporary name of its own, and the last rename counts.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_shared(path: &Path, bytes: &[u8]) -> Result<()> {
+    let part = part_of(&path.with_extension(own_word()));
+    let mut file = AtomicFile::open(path.to_path_buf(), part)?;
+    file.write_all(bytes).map_err(|e| Error::of_file("file cannot be written", path, e))?;
+    file.commit()
+}
+
+/// A word for temporary names that no other process uses, not even one on another machine or in
+/// another process namespace: numbers of processes repeat there.
+#[must_use]
+pub fn own_word() -> String {
+    use std::hash::{BuildHasher, Hasher};
+    static N_WORDS: AtomicU64 = AtomicU64::new(0);
+    let mut hasher = std::collections::hash_map::RandomState::new().build_hasher();
+    hasher.write_u64(N_WORDS.fetch_add(1, Ordering::Relaxed));
+    hasher.write_u32(std::process::id());
+    format!("{:016x}", hasher.finish())
 }
 
 /// The temporary name of a file.

@@ -230,14 +230,20 @@ impl Sources {
     /// Messages about odd points of the open inputs, from the last full read.
     #[must_use]
     pub fn oddities(&self) -> Vec<String> {
-        let of = |file: &OpenFile| -> Vec<String> {
-            let scans = file.reader.scans().iter().enumerate();
-            let said = scans.flat_map(|(i, scan)| {
-                file.reader.oddities(i).map(|odd| odd.said(&scan.name)).unwrap_or_default()
-            });
-            said.collect()
-        };
-        self.files.iter().flat_map(of).collect()
+        self.opened().iter().flat_map(|input| self.oddities_of(input.id)).collect()
+    }
+
+    /// Like [`Sources::oddities`], of one of the open inputs.
+    #[must_use]
+    pub fn oddities_of(&self, input: InputId) -> Vec<String> {
+        let first = self.inputs.len() - self.files.len();
+        let file = (input.0 as usize).checked_sub(first).and_then(|at| self.files.get(at));
+        let Some(file) = file else { return Vec::new() };
+        let scans = file.reader.scans().iter().enumerate();
+        let said = scans.flat_map(|(i, scan)| {
+            file.reader.oddities(i).map(|odd| odd.said(&scan.name)).unwrap_or_default()
+        });
+        said.collect()
     }
 
     /// Refuses inputs whose coordinates are too coarse to recognise a robot.
