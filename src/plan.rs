@@ -119,10 +119,7 @@ impl<'a> Run<'a> {
         })?;
         let chosen = self.shards.map(|_| self.chosen(&tiles));
         let find = || self.robots(found.concat(), &search, &opened, &ground);
-        let (robots, review) = match &chosen {
-            Some(chosen) => self.kept_robots(chosen, &opened.library, find)?,
-            None => find()?,
-        };
+        let (robots, review) = self.kept_robots(chosen.as_ref(), &opened.library, find)?;
         let spaces = KnownSpaces { robots: robots.view(), search: &search, settings };
         let spaces = spaces.all(chosen.as_ref(), engine)?;
         drop(library);
@@ -181,13 +178,14 @@ impl<'a> Run<'a> {
         Cache::new(self.output.fits(), key)
     }
 
-    /// The reviewed robots of the store; otherwise `find` finds them.
+    /// The reviewed robots of the store, where they are kept there; otherwise `find` finds them.
     pub(crate) fn kept_robots(
         &self,
-        chosen: &Cache,
+        chosen: Option<&Cache>,
         library: &Library,
         find: impl FnOnce() -> Result<ReviewedRobots>,
     ) -> Result<ReviewedRobots> {
+        let Some(chosen) = chosen else { return find() };
         let n = library.models.len();
         let keep = || find().map(|(robots, review)| KeptRobots::of(robots, n, review));
         let kept = chosen.get_or_compute(ROBOTS, keep)?;

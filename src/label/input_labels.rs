@@ -224,7 +224,7 @@ impl<'a> Labelling<'a> {
         let all = (0..self.fits.len()).collect::<Vec<_>>();
         let mut robots = self.robot_pictures(&all, engine)?;
         let (mut masks, mut pictures, mut digests) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut oddities, mut records) = (Vec::new(), Records::new(out, self));
+        let (mut oddities, mut records) = (Vec::new(), JoinedRecords::new(out, self));
         for folder in folders {
             let piece = InputLabels::read(folder)?;
             for sum in &piece.sums {
@@ -255,7 +255,7 @@ impl<'a> Labelling<'a> {
 }
 
 /// The files of records of a result, with the parts of each in the order of the inputs.
-struct Records {
+struct JoinedRecords {
     out: PathBuf,
     ending: &'static str,
     /// Tiles by row and column.
@@ -263,7 +263,7 @@ struct Records {
     clouds: [Option<JoinedFile>; 2],
 }
 
-impl Records {
+impl JoinedRecords {
     fn new(out: &Path, labelling: &Labelling<'_>) -> Self {
         let ending = labelling.export.records(&labelling.las()).ending();
         Self { out: out.to_path_buf(), ending, tiles: BTreeMap::new(), clouds: [None, None] }

@@ -1,7 +1,8 @@
 //! Records of inputs and regions that a job leaves out because they failed, for jobs that keep
 //! going. Each is a small file in the store, so that all processes of the job know of it.
 
-use super::list::{Listing, Shard, ShardTask};
+use super::list::Shard;
+use super::listing::{Listing, ShardTask};
 use super::work::{DoneShard, HowDone};
 use crate::detect::region_failures::RegionFailures;
 use crate::job::Job;
@@ -99,7 +100,7 @@ impl LeftOut {
     ) -> Result<()> {
         let path = &run.job.inputs[at];
         let says = format!("left out: {error}");
-        let id = super::list::tiles_id(run, path);
+        let id = super::listing::tiles_id(run, path);
         let part = LeftOutPart {
             shard: Some(Shard::of_input(id.clone(), path)),
             input: Some(stamped(path)),

@@ -9,6 +9,7 @@
 
 mod left_out;
 mod list;
+mod listing;
 mod work;
 
 use crate::cache::{Digests, OutputDir};
@@ -17,7 +18,7 @@ use crate::job::{Job, Outcome};
 use crate::plan::Run;
 use contract::{Error, Kind, Result};
 use left_out::LeftOut;
-use list::Listing;
+use listing::Listing;
 use std::time::Instant;
 
 pub use list::{Shard, ShardKind, ShardList, ShardState};

@@ -1,7 +1,8 @@
 //! The work of one shard: one step of the plan, whose result becomes a piece of the store.
 
-use super::list::{
-    GROUND, GroundAndRegions, Listing, PART, Shard, ShardTask, ground_kept, input_tiles,
+use super::list::Shard;
+use super::listing::{
+    GROUND, GroundAndRegions, Listing, PART, ShardTask, ground_kept, input_tiles,
 };
 use crate::cache::{Cache, Key, settle_folder};
 use crate::detect::ground::{Ground, GroundPart};
@@ -166,7 +167,7 @@ impl OfPlant<'_> {
         })?;
         let chosen = run.chosen(tiles);
         let find = || run.robots(found.concat(), search, opened, &plant.ground);
-        let (robots, _) = run.kept_robots(&chosen, &opened.library, find)?;
+        let (robots, _) = run.kept_robots(Some(&chosen), &opened.library, find)?;
         let near = self.labelling(&robots).near_robots(&self.store, run.engine)?;
         near.keep(&chosen, &opened.sources.masks)
     }
@@ -178,7 +179,7 @@ impl OfPlant<'_> {
             Err(Error::new(Kind::Io, "the robots of the job are missing in its store")
                 .hint("list the shards again"))
         };
-        let (robots, _) = self.run.kept_robots(&chosen, &self.opened.library, lost)?;
+        let (robots, _) = self.run.kept_robots(Some(&chosen), &self.opened.library, lost)?;
         Ok((chosen, robots))
     }
 

@@ -6,7 +6,6 @@ use contract::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::io::{IoSlice, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// File name extension of a file that is not complete.
 pub const PART: &str = "part";
@@ -141,16 +140,13 @@ pub fn write_shared(path: &Path, bytes: &[u8]) -> Result<()> {
     file.commit()
 }
 
-/// A word for temporary names that no other process uses, not even one on another machine or in
-/// another process namespace: numbers of processes repeat there.
+/// A word for temporary names that no other process uses, not even one on another machine: numbers
+/// of processes repeat there, so the word is made of what the system draws for each hash table.
 #[must_use]
 pub fn own_word() -> String {
     use std::hash::{BuildHasher, Hasher};
-    static N_WORDS: AtomicU64 = AtomicU64::new(0);
-    let mut hasher = std::collections::hash_map::RandomState::new().build_hasher();
-    hasher.write_u64(N_WORDS.fetch_add(1, Ordering::Relaxed));
-    hasher.write_u32(std::process::id());
-    format!("{:016x}", hasher.finish())
+    let drawn = std::collections::hash_map::RandomState::new().build_hasher().finish();
+    format!("{drawn:016x}")
 }
 
 /// The temporary name of a file.

@@ -19,8 +19,8 @@ impl LasSettings {
     }
 }
 
-/// Writes the records of all `parts`, in their order, to the file `path` with records as `las` says.
-/// The parts have the same records without compression ([`LasSettings::to_join`]).
+/// Writes the records of all `parts`, in their order, to the file `path` with records as `las`
+/// says. The parts have the same records without compression ([`LasSettings::to_join`]).
 ///
 /// # Errors
 /// A part that cannot be read or is no such file; a file that cannot be written.
