@@ -15,6 +15,7 @@ Each row of OUT/rows.jsonl is one job: wall-clock time, kills, shards that were 
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import subprocess
@@ -202,9 +203,10 @@ def plant(cluster, job, out, python, node_kills, head_kills, draw, length):
         process.kill()
     events.close()
     said = [json.loads(text) for text in Path(events.name).read_text().splitlines() if text.startswith("{")]
-    made = [event["id"] for event in said if event["event"] == "shard"]
+    ends = [event for event in said if event["event"] == "shard"]
+    made = [event["id"] for event in ends]
     return {"seconds": round(seconds, 2), "code": process.returncode, **{f"{kind}_kills": n for kind, n in done.items()},
-            "shards": len(set(made)), "ends": len(made), "failures": sum(e["event"] == "failure" for e in said),
+            "processor": round(sum(e["processor"] for e in ends), 2), "shards": len(set(made)), "ends": len(made), "failures": sum(e["event"] == "failure" for e in said),
             "drivers": 1 + sum(e["event"] == "restart" for e in said)}
 
 
@@ -229,9 +231,11 @@ def main():
 
     def single():
         shutil.rmtree(folder / "one", ignore_errors=True)
-        begun = time.monotonic()
+        begun, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(job.command(folder / "one", "--threads", "2"), check=True, stdout=subprocess.DEVNULL)
-        row(job="one machine, two threads", seconds=round(time.monotonic() - begun, 2))
+        after, seconds = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic() - begun
+        processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        row(job="one machine, two threads", seconds=round(seconds, 2), processor=round(processor, 2))
 
     cluster = Cluster(flags.python, folder)
     try:
