@@ -2,6 +2,7 @@
 //! decides order: `shards/` hands the same steps to many processes.
 
 use crate::cache::input_tiles::InputTiles;
+use crate::cache::kept_looks::KeptLooks;
 use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, VerifiedFiles, WholeResult};
 use crate::detect::calibrate::calibrate;
 use crate::detect::ground::Ground;
@@ -154,7 +155,13 @@ impl<'a> Run<'a> {
         let review = Review::of(job, &library.models)?;
         let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
-        let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
+        let looks = KeptLooks { digests, settings, folder: output.looks() };
+        let open = || match (self.shards, scanners.as_ref()) {
+            (None, known) => ingest::open(&job.inputs, known, &settings.ingest, &AllThreads),
+            (Some(_), known) => {
+                ingest::open_known(&job.inputs, known, &settings.ingest, &looks, &AllThreads)
+            }
+        };
         let sources = engine.pool()?.install(open)?;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
@@ -169,7 +176,10 @@ impl<'a> Run<'a> {
     /// Failures of regions, with those that were left out before.
     pub(crate) fn region_failures(&self) -> RegionFailures {
         let failures = RegionFailures::of(self.job);
-        self.shards.map_or(RegionFailures::of(self.job), |known| failures.with(known))
+        match self.shards {
+            Some(known) => failures.with(known),
+            None => failures,
+        }
     }
 
     /// Pieces of what follows the search, for runs whose shards many processes make.

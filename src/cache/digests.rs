@@ -183,6 +183,12 @@ impl Digests {
         Key::of("shard", &[&job, &self.library, &self.others, kind, &words(of)])
     }
 
+    /// Key of what samples tell of the input at this position, whose content need not be known.
+    pub(crate) fn look_key(&self, at: usize, settings: &Settings) -> Key {
+        let file = words(&self.files[at]);
+        Key::of("look", &[&file, &self.others, &words(&settings.ingest)])
+    }
+
     /// Waits until the modification time of each input is old enough to tell of later changes.
     pub(crate) fn settle(&self) {
         let is_young = |(_, stamp): &(PathBuf, Stamp)| !stamp.is_settled();

@@ -9,6 +9,7 @@ mod digests;
 mod file_digests;
 mod given_input;
 pub(crate) mod input_tiles;
+pub(crate) mod kept_looks;
 mod key;
 mod manifest;
 mod output;

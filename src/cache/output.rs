@@ -102,7 +102,7 @@ impl OutputDir {
         refuse_file(out)?;
         places::refuse_links(out)?;
         let (store, next) = (out.join("store"), out.join("store").join("next"));
-        for pieces in ["fits", "models", "labels", "left_out"] {
+        for pieces in ["fits", "models", "labels", "looks", "left_out"] {
             std::fs::create_dir_all(store.join(pieces)).map_err(at)?;
         }
         let lock = store.join("lock");
@@ -158,6 +158,11 @@ impl OutputDir {
         self.store.join("labels")
     }
 
+    /// Folder of what samples of inputs have told, for the processes that do a job together.
+    pub(crate) fn looks(&self) -> PathBuf {
+        self.store.join("looks")
+    }
+
     /// Folder of records about shards that failed and were left out.
     pub(crate) fn left_out(&self) -> PathBuf {
         self.store.join("left_out")
@@ -169,6 +174,7 @@ impl OutputDir {
         let names: Vec<String> = fits.iter().map(|kept| kept.name()).collect();
         prune(&self.fits(), &names);
         prune(&self.labels(), &[]);
+        prune(&self.looks(), &[]);
         prune(&self.left_out(), &[]);
     }
 

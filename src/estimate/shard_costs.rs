@@ -11,10 +11,12 @@ use ingest::Sources;
 const START: f64 = 0.3;
 /// Points per second that one thread copies from the pieces of inputs to files of the result.
 const JOIN: f64 = 20e6;
+/// Points per second of one thread that labels an input and writes its piece.
+const LABELS: f64 = 4e6;
 /// Processor seconds for the space around one robot.
-const SPACE: f64 = 1.0;
-/// Processor seconds for the choice of one robot, its tool, and its labels.
-const CHOICE: f64 = 1.0;
+const SPACE: f64 = 0.2;
+/// Processor seconds for the choice among the fits of one region.
+const CHOICE: f64 = 0.1;
 
 /// Estimated processor time (seconds) and memory (bytes) of one shard.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,7 +97,7 @@ impl<'a> ShardCosts<'a> {
     /// Labels, masks and records of an input.
     pub(crate) fn labels(&self, input: &Input) -> ShardCost {
         let n = points(self.sources, input);
-        self.cost(n as f64 / REST[3], n / LABEL_BYTES)
+        self.cost(n as f64 / LABELS, n / LABEL_BYTES)
     }
 
     /// Joining all labels to the result.

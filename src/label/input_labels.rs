@@ -97,7 +97,7 @@ pub(crate) fn write(
     folder: &Path,
     engine: &Engine,
 ) -> Result<()> {
-    let labelling = labelling.to_join();
+    let labelling = labelling.joined_later();
     let bounds = labelling.bounds_of(input.id);
     let near_grid = |grid: &SpaceGrid| grid.bounds().touches(&bounds);
     let spaces = grids.iter().map(|grid| grid.filter(near_grid).map(Space::unknown)).collect();
@@ -203,7 +203,7 @@ fn link(from: &Path, to: &Path) -> Result<()> {
 
 impl<'a> Labelling<'a> {
     /// The same labelling with records that are joined later.
-    fn to_join(mut self) -> Self {
+    fn joined_later(mut self) -> Self {
         self.export.compress = false;
         self
     }

@@ -49,7 +49,7 @@ impl LeftOut {
         // The order of the inputs, then of the regions.
         let place = |part: &LeftOutPart| {
             let is_of = |path: &std::path::PathBuf| part.input_path() == Some(&*text(path));
-            (job.inputs.iter().position(|p| is_of(p)).unwrap_or(usize::MAX), part.says.clone())
+            (job.inputs.iter().position(is_of).unwrap_or(usize::MAX), part.says.clone())
         };
         out.parts.sort_by_key(place);
         let regions = out.parts.iter().filter_map(|part| {

@@ -144,6 +144,8 @@ fn attend<T>(
     shares: bool,
     mut work: impl FnMut(&Run<'_>, &LeftOut) -> Result<T>,
 ) -> Result<(T, LeftOut)> {
+    // An input that changes all the time is never known as the one that was left out.
+    let mut n_failures = 0;
     loop {
         let left = LeftOut::read(job)?;
         let reduced = left.without(job);
@@ -154,7 +156,11 @@ fn attend<T>(
         match work(&run, &left) {
             Ok(done) => return Ok((done, left)),
             Err(error) => {
-                let Some(at) = reduced.failed_input(&error) else { return Err(error) };
+                let failed = reduced.failed_input(&error);
+                let Some(at) = failed.filter(|_| n_failures < job.inputs.len()) else {
+                    return Err(error);
+                };
+                n_failures += 1;
                 let path = &reduced.inputs[at];
                 engine.progress.say(&format!("{} is left out: {error}", path.display()));
                 left.add_input(job, &run, at, &error)?;
