@@ -1,5 +1,5 @@
-//! What samples of inputs have told, as pieces of the store: processes that do a job together sample
-//! each input once.
+//! What samples of inputs have told, as pieces of the store: processes that do a job together
+//! sample each input once.
 
 use super::digests::Digests;
 use super::pieces::Cache;
