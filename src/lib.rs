@@ -5,7 +5,8 @@
 //! Rooms import only rooms to their left:
 //!
 //! ```text
-//! engine  io  job  store  cache  detect  label  result  estimate  rescan  check  arrays  plan  eval  cli
+//! engine  io  job  store  cache  detect  label  result  estimate  rescan  check  arrays  plan
+//! shards  eval  cli
 //! ```
 //!
 //! Only the command line imports `eval`. `tests/house.rs` holds the order, and that no files import
@@ -25,4 +26,5 @@ mod label;
 pub mod plan;
 pub mod rescan;
 pub mod result;
+pub mod shards;
 pub mod store;

@@ -1,13 +1,14 @@
 //! The order of all steps of a run, from opened inputs to the published result. No other module
-//! decides order.
+//! decides order: `shards/` hands the same steps to many processes.
 
 use crate::cache::input_tiles::InputTiles;
+use crate::cache::kept_looks::KeptLooks;
 use crate::cache::{self, Cache, Digests, Key, OutputDir, OutputFile, VerifiedFiles, WholeResult};
 use crate::detect::calibrate::calibrate;
 use crate::detect::ground::Ground;
 use crate::detect::region_failures::RegionFailures;
 use crate::detect::review::Review;
-use crate::detect::robots::{FittedRobots, RobotList};
+use crate::detect::robots::{FittedRobots, KeptRobots, RobotList};
 use crate::detect::search::{PreparedLibrary, Search};
 use crate::detect::{library, tools};
 use crate::engine::{AllThreads, Engine, Task};
@@ -15,6 +16,7 @@ use crate::estimate::Estimate;
 use crate::job::{Job, Outcome, Settings, units};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
+use crate::label::near_robots::NearRobots;
 use crate::result::plant_state::{PlantState, Records};
 use crate::result::report::Report;
 use crate::result::{copc, page};
@@ -23,6 +25,11 @@ use contract::{Cluster, Fit, Input, Result, Space};
 use export::{COPC, ReviewEntry};
 use ingest::{KnownScanners, Sources};
 use robot::Library;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Name of the piece of the store with the robots that were chosen.
+pub(crate) const ROBOTS: &str = "robots";
 
 /// Runs the main job: finds the robots in the scans and labels all points.
 ///
@@ -34,23 +41,26 @@ pub fn run(job: &Job, engine: &Engine) -> Result<Outcome> {
     if let Some(manifest) = digests.unchanged(job, &output)? {
         return Ok(manifest.outcome());
     }
-    Run { job, settings: &job.means.settings, output: &output, digests: &digests, engine }.execute()
+    Run::new(job, &output, &digests, engine).execute()
 }
 
 /// A run that is not answered by an unchanged result.
-struct Run<'a> {
-    job: &'a Job,
-    settings: &'a Settings,
-    output: &'a OutputDir,
-    digests: &'a Digests,
-    engine: &'a Engine,
+pub(crate) struct Run<'a> {
+    pub(crate) job: &'a Job,
+    pub(crate) settings: &'a Settings,
+    pub(crate) output: &'a OutputDir,
+    pub(crate) digests: &'a Digests,
+    pub(crate) engine: &'a Engine,
+    /// Where processes make the shards of the job: messages about regions that were left out. What
+    /// follows the search is then taken from the store, too.
+    pub(crate) shards: Option<&'a BTreeMap<String, String>>,
 }
 
 /// Library, review and opened scans, before any point is read.
-struct Opened {
-    library: Library,
-    review: Review,
-    sources: Sources,
+pub(crate) struct Opened {
+    pub(crate) library: Library,
+    pub(crate) review: Review,
+    pub(crate) sources: Sources,
 }
 
 /// The scanned plant, before anything is searched in it.
@@ -64,16 +74,21 @@ struct ScannedPlant<'a> {
     clusters: &'a [Cluster],
 }
 
-/// The robots that were found, after the review.
-struct ReviewedRobots {
-    robots: RobotList,
-    /// Effect of each entry of the review.
-    review: Vec<ReviewEntry>,
-}
+/// The robots that were found, after the review, and the effect of each of its entries.
+type ReviewedRobots = (RobotList, Vec<ReviewEntry>);
 
-impl Run<'_> {
-    fn execute(&self) -> Result<Outcome> {
-        let &Run { job, settings, output, digests, engine } = self;
+impl<'a> Run<'a> {
+    pub(crate) fn new(
+        job: &'a Job,
+        output: &'a OutputDir,
+        digests: &'a Digests,
+        engine: &'a Engine,
+    ) -> Self {
+        Self { job, settings: &job.means.settings, output, digests, engine, shards: None }
+    }
+
+    pub(crate) fn execute(&self) -> Result<Outcome> {
+        let &Run { job, settings, output, digests, engine, .. } = self;
         let models_kept = Cache::new(output.models(), digests.models_key(settings));
         let opened = self.open(&models_kept)?;
         let (sources, scans) = (&opened.sources, &opened.sources.scans);
@@ -97,22 +112,23 @@ impl Run<'_> {
         let library = PreparedLibrary::new(&opened.library.models);
         let search = Search::new(&library, scans, &store, &ground, settings);
         let search = search.over(&regions).keeping(&pieces_kept);
-        let failures = RegionFailures::of(job);
+        let failures = self.region_failures();
         let task = Task::new("fit").large().showing(search.pieces());
         let found = engine.fan_out(task, regions.clone(), |region| {
             let find = || search.region(&region);
             failures.spare(&region, || fits_kept.get_or_compute(&format!("{region:?}"), find))
         })?;
-        let reviewed = self.robots(found.concat(), &search, &opened, &ground)?;
-        let robots = reviewed.robots;
+        let chosen = self.shards.map(|_| self.chosen(&tiles));
+        let find = || self.robots(found.concat(), &search, &opened, &ground);
+        let (robots, review) = self.kept_robots(chosen.as_ref(), &opened.library, find)?;
         let spaces = KnownSpaces { robots: robots.view(), search: &search, settings };
-        let spaces = spaces.all(engine)?;
+        let spaces = spaces.all(chosen.as_ref(), engine)?;
         drop(library);
 
         // Tiles near robots are read again; then all points.
         let (tiles, clusters) = (&tiles[..], &clusters[..]);
         let plant = ScannedPlant { sources, tiles, store: &store, ground: &ground, clusters };
-        let written = self.label(plant, robots.view(), spaces)?;
+        let written = self.label(plant, robots.view(), spaces, chosen.as_ref())?;
         let report = Report {
             digests,
             sources,
@@ -121,7 +137,7 @@ impl Run<'_> {
             robots: robots.view(),
             n_searched: [clusters.len(), regions.len()],
             written: &written,
-            review: reviewed.review,
+            review,
             left_out: failures.messages(job),
         };
         let mut outcome = report.finish(output)?;
@@ -133,13 +149,19 @@ impl Run<'_> {
     }
 
     /// Reads library and review, opens the scans, and checks disk and memory.
-    fn open(&self, models_kept: &Cache) -> Result<Opened> {
-        let &Run { job, settings, output, digests, engine } = self;
+    pub(crate) fn open(&self, models_kept: &Cache) -> Result<Opened> {
+        let &Run { job, settings, output, digests, engine, .. } = self;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let review = Review::of(job, &library.models)?;
         let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
         let scanners = job.scanners.as_deref().map(read).transpose()?;
-        let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
+        let looks = KeptLooks { digests, settings, folder: output.looks() };
+        let open = || match (self.shards, scanners.as_ref()) {
+            (None, known) => ingest::open(&job.inputs, known, &settings.ingest, &AllThreads),
+            (Some(_), known) => {
+                ingest::open_known(&job.inputs, known, &settings.ingest, &looks, &AllThreads)
+            }
+        };
         let sources = engine.pool()?.install(open)?;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
@@ -151,9 +173,44 @@ impl Run<'_> {
         Ok(Opened { library, review, sources })
     }
 
+    /// Failures of regions, with those that were left out before.
+    pub(crate) fn region_failures(&self) -> RegionFailures {
+        let failures = RegionFailures::of(self.job);
+        match self.shards {
+            Some(known) => failures.with(known),
+            None => failures,
+        }
+    }
+
+    /// Pieces of what follows the search, for runs whose shards many processes make.
+    pub(crate) fn chosen(&self, tiles: &[Key]) -> Cache {
+        let key = self.digests.robots_key(tiles, self.settings, &self.shards);
+        Cache::new(self.output.fits(), key)
+    }
+
+    /// The reviewed robots of the store, where they are kept there; otherwise `find` finds them.
+    pub(crate) fn kept_robots(
+        &self,
+        chosen: Option<&Cache>,
+        library: &Library,
+        find: impl FnOnce() -> Result<ReviewedRobots>,
+    ) -> Result<ReviewedRobots> {
+        let Some(chosen) = chosen else { return find() };
+        let n = library.models.len();
+        let keep = || find().map(|(robots, review)| KeptRobots::of(robots, n, review));
+        let kept = chosen.get_or_compute(ROBOTS, keep)?;
+        Ok(kept.with(&library.models))
+    }
+
+    /// Folders of the labels of all inputs, in their order.
+    pub(crate) fn label_folders(&self, chosen: &Cache, inputs: &[Input]) -> Vec<PathBuf> {
+        let key = |input: &Input| Digests::labels_key(chosen.key(), input);
+        inputs.iter().map(|input| self.output.labels().join(key(input).name())).collect()
+    }
+
     /// Chooses compatible fits, adds tools, calibrates joints on request, estimates the
     /// registration error of each scan, and applies the review.
-    fn robots(
+    pub(crate) fn robots(
         &self,
         found: Vec<Fit>,
         search: &Search<'_, '_>,
@@ -175,7 +232,7 @@ impl Run<'_> {
             fit::together(&mut fits, &models, scans, still, &settings.fit);
         }
         let review = review.effects(&without, &fits, &wrong);
-        Ok(ReviewedRobots { robots: RobotList { fits, models }, review })
+        Ok((RobotList { fits, models }, review))
     }
 
     /// Labels points near robots as links or attached bodies; then the second pass labels and
@@ -185,16 +242,23 @@ impl Run<'_> {
         plant: ScannedPlant<'_>,
         robots: FittedRobots<'_>,
         spaces: Vec<Option<Space>>,
+        chosen: Option<&Cache>,
     ) -> Result<WrittenLabels> {
         let (settings, next, engine) = (self.settings, self.output.next(), self.engine);
         let ScannedPlant { sources, store, ground, clusters, .. } = plant;
         let floor = &ground.surfaces.floor;
         let scans = ScansToLabel { sources, store, floor, clusters };
         let labelling = Labelling::new(robots, &scans, settings);
-        let near = labelling.near_robots(store, engine)?;
-        let to = LabelFolders { out: next, clouds: next };
-        let written = labelling.write(&near, spaces, &Scope::default(), to, engine)?;
-        let written = written.finish(engine)?;
+        let written = if let Some(chosen) = chosen {
+            let near = NearRobots::kept(chosen, &sources.masks, None)?;
+            let folders = self.label_folders(chosen, &sources.inputs);
+            labelling.join(&near, spaces, &folders, next, engine)?.finish(engine)?
+        } else {
+            let near = labelling.near_robots(store, engine)?;
+            let to = LabelFolders { out: next, clouds: next };
+            let written = labelling.write(&near, spaces, &Scope::default(), to, engine)?;
+            written.finish(engine)?
+        };
         if settings.export.copc {
             copc::write(&export::tiles(next)?, &next.join(COPC), &self.output.scratch(), engine)?;
         }
@@ -210,7 +274,7 @@ impl Run<'_> {
         written: &WrittenLabels,
         outcome: &Outcome,
     ) -> Result<Vec<String>> {
-        let &Run { job, settings, output, digests, engine } = self;
+        let &Run { job, settings, output, digests, engine, .. } = self;
         let (sources, next) = (plant.sources, output.next());
         sources.inputs.iter().try_for_each(|input| digests.check(input))?;
         PlantState {

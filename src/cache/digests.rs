@@ -1,6 +1,6 @@
 //! Digests of all files that a run reads, and the keys of the pieces that are computed from them.
 
-use super::file_digests::{Algorithm, FileDigests, Pace, Stamp};
+use super::file_digests::{Algorithm, FileDigests, Pace, SETTLED, Stamp};
 use super::key::Key;
 use super::manifest;
 use super::manifest::Manifest;
@@ -32,12 +32,15 @@ impl Digests {
     /// Reads every file of the job once, except files that are known and unchanged, and new inputs,
     /// which are digested while they are decoded.
     pub(crate) fn of(job: &Job, output: &OutputDir, engine: &Engine) -> Result<Self> {
-        let contents = FileDigests::open(output.store());
+        let is_shared = output.is_shared();
+        let contents =
+            if is_shared { FileDigests::open_shared } else { FileDigests::open }(output.store());
         let stamped = |path: &PathBuf| Ok((path.clone(), Stamp::of(path)?));
         let files = job.inputs.iter().map(stamped).collect::<Result<_>>()?;
         let digest = |path: &PathBuf| -> Result<OnceLock<String>> {
-            let is_new =
-                contents.known(path, Algorithm::Blake3)?.is_none() && !contents.may_know(path)?;
+            // Each of many processes would read all inputs that are perhaps known.
+            let is_new = contents.known(path, Algorithm::Blake3)?.is_none()
+                && (is_shared || !contents.may_know(path)?);
             Ok(if is_new {
                 OnceLock::new()
             } else {
@@ -142,6 +145,56 @@ impl Digests {
         let ground = words(&(&s.lattice, &s.floor, &s.cluster, &s.region));
         let search = words(&(&s.view, &s.base_search, &s.method, &s.fit, &s.paper, &s.robot));
         Key::of("fits", &[&words(&tiles), &self.library, &ground, &search])
+    }
+
+    /// Key of what one input adds to floor, planes and occupied space.
+    pub(crate) fn ground_part_key(
+        &self,
+        input: &Input,
+        scans: &[Scan],
+        settings: &Settings,
+    ) -> Option<Key> {
+        let tiles = self.tiles_key(input, scans, settings)?;
+        let stages = words(&(&settings.lattice, &settings.floor));
+        Some(Key::of("ground part", &[tiles.name(), &words(&(input.id, scans)), &stages]))
+    }
+
+    /// Key of the chosen robots and of all that follows from them: known space and labels. Regions
+    /// that were left out are part of it.
+    pub(crate) fn robots_key(
+        &self,
+        tiles: &[Key],
+        settings: &Settings,
+        left_out: &impl Debug,
+    ) -> Key {
+        let fits = self.fits_key(tiles, settings);
+        Key::of("chosen", &[fits.name(), &self.others, &words(&(settings, left_out))])
+    }
+
+    /// Key of the labels of one input of a plant with these robots.
+    pub(crate) fn labels_key(robots: &Key, input: &Input) -> Key {
+        Key::of("labels", &[robots.name(), &words(&input.id)])
+    }
+
+    /// Identity of a shard: it stays the same while the job and its files do. Contents of inputs
+    /// are not part of it, since it is known before they are read.
+    pub(crate) fn shard_key(&self, job: &Job, kind: &str, of: &impl Debug) -> Key {
+        let job = words(&(&self.files, &job.inputs, &job.means.settings, job.keep_going));
+        Key::of("shard", &[&job, &self.library, &self.others, kind, &words(of)])
+    }
+
+    /// Key of what samples tell of the input at this position, whose content need not be known.
+    pub(crate) fn look_key(&self, at: usize, settings: &Settings) -> Key {
+        let file = words(&self.files[at]);
+        Key::of("look", &[&file, &self.others, &words(&settings.ingest)])
+    }
+
+    /// Waits until the modification time of each input is old enough to tell of later changes.
+    pub(crate) fn settle(&self) {
+        let is_young = |(_, stamp): &(PathBuf, Stamp)| !stamp.is_settled();
+        if self.files.iter().any(is_young) {
+            std::thread::sleep(SETTLED);
+        }
     }
 
     /// Key of the models of the library as they are loaded with these settings.

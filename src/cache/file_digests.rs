@@ -14,6 +14,8 @@ use std::time::{Duration, SystemTime};
 
 /// Name of the list of known digests in the store.
 const LIST: &str = "contents.json";
+/// Folder of lists that processes have added which fill the store together.
+const ADDED: &str = "contents";
 /// Number of bytes that are read at a time.
 const PIECE: usize = 1 << 20;
 /// Most bytes by which digesting may run ahead of decoding, so that the file is still in the page
@@ -21,7 +23,7 @@ const PIECE: usize = 1 << 20;
 const AHEAD: u64 = 256 << 20;
 /// Age below which a modification time is not trusted: the file could change again without a change
 /// of its time.
-const SETTLED: Duration = Duration::from_secs(2);
+pub(super) const SETTLED: Duration = Duration::from_secs(2);
 
 /// Length, modification time and inode of a file. While these stay, its bytes are taken to be
 /// unchanged.
@@ -44,25 +46,44 @@ struct KnownFile {
 /// All known digests of files.
 pub(super) struct FileDigests {
     list: PathBuf,
+    /// Folder of lists that processes have added.
+    added: PathBuf,
     seen: Mutex<BTreeMap<String, KnownFile>>,
+    /// What this process has added, where others fill the store at the same time.
+    own: Option<Mutex<BTreeMap<String, KnownFile>>>,
 }
 
 impl FileDigests {
     /// Opens the list that an earlier run left in the store; an unreadable list counts as empty.
     pub(super) fn open(store: &Path) -> Self {
-        let list = store.join(LIST);
-        let text = std::fs::read_to_string(&list).unwrap_or_default();
-        let seen = serde_json::from_str(&text).unwrap_or_default();
-        Self { list, seen: Mutex::new(seen) }
+        let (list, added) = (store.join(LIST), store.join(ADDED));
+        let mut seen = read_list(&list);
+        for entry in std::fs::read_dir(&added).into_iter().flatten().flatten() {
+            seen.extend(read_list(&entry.path()));
+        }
+        Self { list, added, seen: Mutex::new(seen), own: None }
+    }
+
+    /// Like [`FileDigests::open`], for one of many processes that fill the store: it keeps what it
+    /// learns in a list of its own.
+    pub(super) fn open_shared(store: &Path) -> Self {
+        Self { own: Some(Mutex::default()), ..Self::open(store) }
     }
 
     /// Writes the list for the next run.
     pub(super) fn keep(&self) -> Result<()> {
-        let seen = self.seen.lock().expect("no thread panics while it holds the list");
-        let text = serde_json::to_string_pretty(&*seen).map_err(|e| {
-            Error::new(Kind::Bug, "the list of known digests cannot be encoded").because(e)
-        })?;
-        atomic::write(&self.list, text.as_bytes())
+        let Some(own) = &self.own else {
+            atomic::write(&self.list, encoded(&self.lock())?.as_bytes())?;
+            let _ = std::fs::remove_dir_all(&self.added);
+            return Ok(());
+        };
+        let own = own.lock().expect("no thread panics while it holds the list");
+        if own.is_empty() {
+            return Ok(());
+        }
+        let text = encoded(&own)?;
+        let name = blake3::hash(text.as_bytes()).to_hex();
+        atomic::write_shared(&self.added.join(name.as_str()), text.as_bytes())
     }
 
     /// The digest of a file, which is read unless it is known.
@@ -76,8 +97,16 @@ impl FileDigests {
     /// Records the digest of a file that this program has written.
     pub(super) fn believe(&self, path: &Path, digest: &str) -> Result<()> {
         let seen = KnownFile { stamp: Stamp::of(path)?, digest: digest.to_owned() };
-        self.lock().insert(name(path)?, seen);
+        self.add(name(path)?, seen);
         Ok(())
+    }
+
+    fn add(&self, name: String, file: KnownFile) {
+        if let Some(own) = &self.own {
+            let mut own = own.lock().expect("no thread panics while it holds the list");
+            own.insert(name.clone(), file.clone());
+        }
+        self.lock().insert(name, file);
     }
 
     /// The digest of a file that is unchanged since it was read; `None` for other files.
@@ -107,8 +136,9 @@ impl FileDigests {
     /// changed meanwhile.
     pub(super) fn take(&self, path: &Path, stamp: Stamp, digest: &str) -> Result<()> {
         stamp.check(path)?;
-        if stamp.is_settled() {
-            self.lock().insert(name(path)?, KnownFile { stamp, digest: digest.to_owned() });
+        // Where many processes do a job, its first has waited until all inputs were settled.
+        if stamp.is_settled() || self.own.is_some() {
+            self.add(name(path)?, KnownFile { stamp, digest: digest.to_owned() });
         }
         Ok(())
     }
@@ -138,6 +168,18 @@ impl FileDigests {
     }
 }
 
+/// A list of known digests; an unreadable list counts as empty.
+fn read_list(path: &Path) -> BTreeMap<String, KnownFile> {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    serde_json::from_str(&text).unwrap_or_default()
+}
+
+fn encoded(list: &BTreeMap<String, KnownFile>) -> Result<String> {
+    serde_json::to_string_pretty(list).map_err(|e| {
+        Error::new(Kind::Bug, "the list of known digests cannot be encoded").because(e)
+    })
+}
+
 impl Stamp {
     pub(super) fn of(path: &Path) -> Result<Self> {
         let meta = std::fs::metadata(path).map_err(|e| Error::from(e).at(path.display()))?;
@@ -159,7 +201,7 @@ impl Stamp {
     }
 
     /// Whether its modification time is old enough that a later change would alter it.
-    fn is_settled(&self) -> bool {
+    pub(super) fn is_settled(&self) -> bool {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         now.is_ok_and(|now| now.as_nanos() > self.changed + SETTLED.as_nanos())
     }

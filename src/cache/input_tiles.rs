@@ -3,16 +3,19 @@
 use super::digests::Digests;
 use super::file_digests::Pace;
 use super::key::Key;
+use super::output::settle_folder;
 use crate::engine::{Engine, Task};
 use crate::io::read_parts::InputReader;
 use crate::job::Means;
 use crate::store::{Scatter, Store, TileSink};
 use contract::{Error, Input, Kind, Result, Weigh};
+use export::atomic;
 use ingest::{Sources, Want};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
-/// Prefix of the folder of a store that is being filled; the number of its input follows.
+/// Prefix of the folder of a store that is being filled; the number of its input and a word of the
+/// process follow.
 const NEW: &str = "new-";
 
 /// Job, engine and folders for filling the stores of inputs.
@@ -43,13 +46,13 @@ impl<'a> InputTiles<'a> {
 
     /// Keys of the tiles of some inputs, and one store of all.
     pub(crate) fn of_all(&self, inputs: &[Input], digests: &Digests) -> Result<(Vec<Key>, Store)> {
-        let filled = inputs.iter().map(|input| self.tiles_of(input, digests));
+        let filled = inputs.iter().map(|input| self.of_one(input, digests));
         let (keys, stores): (Vec<Key>, Vec<Store>) = filled.collect::<Result<_>>()?;
         Ok((keys, Store::join(stores)))
     }
 
     /// Key and store of one input. A store that opens is used again; a damaged one is made anew.
-    fn tiles_of(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
+    pub(crate) fn of_one(&self, input: &Input, digests: &Digests) -> Result<(Key, Store)> {
         let scans = &self.sources.scans;
         let first = scans.iter().find(|s| s.input == input.id).map_or(0, |s| s.id.0);
         let resident_bytes = self.means.store_bytes() / self.sources.inputs.len().max(1);
@@ -61,13 +64,16 @@ impl<'a> InputTiles<'a> {
             self.n_kept.set([n_kept + 1, n + 1]);
             return Ok((key, store));
         }
-        let new = self.folder.join(format!("{NEW}{}", input.id.0));
-        self.fill(&new, input, first, resident_bytes, digests)?;
+        let prefix = format!("{NEW}{}-", input.id.0);
+        let new = self.folder.join(format!("{prefix}{}", atomic::own_word()));
+        let filled = self.fill(&new, input, first, resident_bytes, digests);
+        if let Err(error) = filled {
+            let _ = std::fs::remove_dir_all(&new);
+            return Err(error);
+        }
         let key = key().ok_or_else(|| Error::new(Kind::Bug, "an input was not read"))?;
-        let place = self.folder.join(key.name());
-        let _ = std::fs::remove_dir_all(&place);
-        let moved = std::fs::rename(&new, &place);
-        moved.map_err(|e| Error::from(e).at(place.display()))?;
+        let is_whole = |place: &Path| Store::open(place, first, resident_bytes).is_ok();
+        settle_folder(&new, &self.folder.join(key.name()), &prefix, is_whole)?;
         Ok((key.clone(), open(&key)?))
     }
 
@@ -82,8 +88,6 @@ impl<'a> InputTiles<'a> {
         digests: &Digests,
     ) -> Result<()> {
         let scans = &self.sources.scans;
-        // Files that an interrupted run has left there would stay in the store for ever.
-        let _ = std::fs::remove_dir_all(dir);
         let mut sink = TileSink::create(dir, scans, first, self.means.ingest_bytes())?;
         let scatter = Scatter::new(scans);
         let reading = InputReader { sources: self.sources, input, want: Want::Coordinates };

@@ -41,6 +41,15 @@ impl Job {
         self.check_places()?;
         OutputDir::prepare(&self.out)
     }
+
+    /// Like [`Job::output`], for one of many processes that fill the store of the folder.
+    ///
+    /// # Errors
+    /// Those of [`Job::output`].
+    pub(crate) fn shared_output(&self) -> Result<OutputDir> {
+        self.check_places()?;
+        OutputDir::share(&self.out)
+    }
 }
 
 /// The locked output folder of a run.
@@ -49,8 +58,9 @@ pub struct OutputDir {
     out: PathBuf,
     store: PathBuf,
     next: PathBuf,
-    /// The lock, held during the run; the system releases it however the run ends.
-    _lock: Arc<File>,
+    /// The lock, held during the run; the system releases it however the run ends. A process that
+    /// makes one shard of a job holds none.
+    lock: Option<Arc<File>>,
 }
 
 impl OutputDir {
@@ -61,10 +71,7 @@ impl OutputDir {
     /// A path that is a file, a folder that another run uses, or an error of the system.
     fn prepare(out: &Path) -> Result<Self> {
         let at = |e: std::io::Error| Error::from(e).at(out.display());
-        if out.exists() && !out.is_dir() {
-            let what = "the output path is a file, not a folder";
-            return Err(Error::bad_input(what).at(out.display()).hint("give another --out"));
-        }
+        refuse_file(out)?;
         places::refuse_links(out)?;
         let store = out.join("store");
         std::fs::create_dir_all(&store).map_err(at)?;
@@ -82,7 +89,33 @@ impl OutputDir {
         }
         sweep(&store);
         let _ = std::fs::remove_dir_all(store.join(SCRATCH));
-        Ok(Self { out: out.to_path_buf(), store, next, _lock: Arc::new(lock) })
+        Ok(Self { out: out.to_path_buf(), store, next, lock: Some(Arc::new(lock)) })
+    }
+
+    /// Opens the folder for one of many processes that fill its store at the same time. Nothing is
+    /// removed, and no lock is held: a process that was believed dead must not stand in the way.
+    ///
+    /// # Errors
+    /// A path that is a file, a folder that a run uses by itself, or an error of the system.
+    fn share(out: &Path) -> Result<Self> {
+        let at = |e: std::io::Error| Error::from(e).at(out.display());
+        refuse_file(out)?;
+        places::refuse_links(out)?;
+        let (store, next) = (out.join("store"), out.join("store").join("next"));
+        for pieces in ["fits", "models", "labels", "looks", "left_out"] {
+            std::fs::create_dir_all(store.join(pieces)).map_err(at)?;
+        }
+        let lock = store.join("lock");
+        let file = File::options().create(true).truncate(false).write(true).open(&lock);
+        let file = file.map_err(|e| Error::from(e).at(lock.display()))?;
+        let taken = file.try_lock_shared();
+        granted(file, taken, &lock).map(drop)?;
+        Ok(Self { out: out.to_path_buf(), store, next, lock: None })
+    }
+
+    /// Whether other processes fill the store at the same time.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.lock.is_none()
     }
 
     /// Folder where results are written; at the end they are moved to [`OutputDir::out`].
@@ -120,11 +153,29 @@ impl OutputDir {
         self.store.join("models")
     }
 
+    /// Folder of the labels of inputs, one subfolder each, until they are joined.
+    pub(crate) fn labels(&self) -> PathBuf {
+        self.store.join("labels")
+    }
+
+    /// Folder of what samples of inputs have told, for the processes that do a job together.
+    pub(crate) fn looks(&self) -> PathBuf {
+        self.store.join("looks")
+    }
+
+    /// Folder of records about shards that failed and were left out.
+    pub(crate) fn left_out(&self) -> PathBuf {
+        self.store.join("left_out")
+    }
+
     /// Removes tiles, fits and models that the run that has just ended did not use.
     pub(crate) fn prune(&self, tiles: &[Key], fits: &[&Cache], models: &Cache) {
         self.prune_tiles(tiles, models);
         let names: Vec<String> = fits.iter().map(|kept| kept.name()).collect();
         prune(&self.fits(), &names);
+        prune(&self.labels(), &[]);
+        prune(&self.looks(), &[]);
+        prune(&self.left_out(), &[]);
     }
 
     /// Removes tiles and models that the run that has just ended did not use.
@@ -146,6 +197,14 @@ impl OutputDir {
     pub fn store(&self) -> &Path {
         &self.store
     }
+}
+
+fn refuse_file(out: &Path) -> Result<()> {
+    if out.exists() && !out.is_dir() {
+        let what = "the output path is a file, not a folder";
+        return Err(Error::bad_input(what).at(out.display()).hint("give another --out"));
+    }
+    Ok(())
 }
 
 /// Locks an output folder exclusively.
@@ -197,6 +256,35 @@ fn sweep(store: &Path) {
             }
         }
     }
+}
+
+/// Gives a new folder of a piece its final name. Where another process was faster, its piece stays
+/// if it is whole. New folders of the same piece that other processes have left behind are removed:
+/// their names begin with `prefix`.
+pub(crate) fn settle_folder(
+    new: &Path,
+    place: &Path,
+    prefix: &str,
+    is_whole: impl Fn(&Path) -> bool,
+) -> Result<()> {
+    // The second time is for a damaged folder that was in the way.
+    for _ in 0..2 {
+        if is_whole(place) || std::fs::rename(new, place).is_ok() {
+            break;
+        }
+        let _ = std::fs::remove_dir_all(place);
+    }
+    let _ = std::fs::remove_dir_all(new);
+    for entry in place.parent().map(std::fs::read_dir).into_iter().flatten().flatten().flatten() {
+        if entry.file_name().to_str().is_some_and(|name| name.starts_with(prefix)) {
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
+    if is_whole(place) {
+        return Ok(());
+    }
+    let what = "a piece of the store could not take its place: another process removes it";
+    Err(Error::new(Kind::Io, what).at(place.display()).hint("start it again"))
 }
 
 /// Removes all entries of a folder of pieces whose names do not begin with one of `used`.

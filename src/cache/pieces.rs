@@ -28,22 +28,43 @@ impl Cache {
         find: impl FnOnce() -> Result<T>,
     ) -> Result<T> {
         self.n_asked.fetch_add(1, Ordering::Relaxed);
-        let name = Key::of("piece", &[self.key.name(), name]);
-        let path = self.folder.join(format!("{}-{}", self.key.name(), name.name()));
-        if let Some(piece) = std::fs::read(&path).ok().and_then(|bytes| read(&bytes)) {
+        if let Some(piece) = self.get(name) {
             self.n_kept.fetch_add(1, Ordering::Relaxed);
             return Ok(piece);
         }
         let piece = find()?;
-        if let Some(bytes) = written(&piece) {
-            atomic::write(&path, &bytes)?;
-        }
+        self.keep(name, &piece)?;
         Ok(piece)
+    }
+
+    /// The cached piece with this name; `None` where it is missing or damaged.
+    pub(crate) fn get<T: DeserializeOwned>(&self, name: &str) -> Option<T> {
+        std::fs::read(self.path(name)).ok().and_then(|bytes| read(&bytes))
+    }
+
+    /// Stores a piece under this name. Other processes may store the same piece at the same time.
+    pub(crate) fn keep(&self, name: &str, piece: &impl Serialize) -> Result<()> {
+        written(piece).map_or(Ok(()), |bytes| atomic::write_shared(&self.path(name), &bytes))
+    }
+
+    /// Whether there is a piece with this name, damaged or not.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.path(name).is_file()
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        let name = Key::of("piece", &[self.key.name(), name]);
+        self.folder.join(format!("{}-{}", self.key.name(), name.name()))
     }
 
     /// Number of pieces that were taken from the cache, and of all that were requested.
     pub(crate) fn n_kept(&self) -> [usize; 2] {
         [&self.n_kept, &self.n_asked].map(|n| n.load(Ordering::Relaxed))
+    }
+
+    /// The key that stands for the contents.
+    pub(crate) fn key(&self) -> &Key {
+        &self.key
     }
 
     /// Prefix of the names of its files.

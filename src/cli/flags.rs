@@ -35,6 +35,13 @@ pub(super) enum Command {
     /// Bring one cell of an earlier result up to date with new scans; writes the whole result and a
     /// list of changes
     Rescan(RescanFlags),
+    /// List the shards of a run: pieces of work that many machines with a shared disk do in its
+    /// place. The list grows while shards are made
+    Shards(ShardsFlags),
+    /// Make one shard of a run; two processes may make the same one
+    Shard(ShardFlags),
+    /// Write the result of a run whose shards are all made
+    Gather(RunFlags),
     /// Verify that the files of a result are unchanged since they were written
     Verify(OutFlags),
     /// Print all about a result; --html makes sure that there is a page with the plant in 3D,
@@ -128,6 +135,31 @@ pub(super) struct RunFlags {
 pub(super) struct PlanFlags {
     #[command(flatten)]
     pub(super) run: RunFlags,
+    /// Print JSON
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ShardsFlags {
+    #[command(flatten)]
+    pub(super) run: RunFlags,
+    /// Print JSON
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ShardFlags {
+    /// Id of the shard, as `shards` lists it
+    #[arg(value_name = "ID")]
+    pub(super) id: String,
+    #[command(flatten)]
+    pub(super) run: RunFlags,
+    /// With --keep-going: do not make the shard, but record why it cannot be made, and let the job
+    /// go on without it
+    #[arg(long, value_name = "WHY", requires = "keep_going")]
+    pub(super) leave_out: Option<String>,
     /// Print JSON
     #[arg(long)]
     pub(super) json: bool,

@@ -6,8 +6,9 @@ use clap::{Command, CommandFactory};
 use std::fmt::Write as _;
 
 /// Commands in the order of the help.
-const GROUPS: [(&str, &[&str]); 6] = [
+const GROUPS: [(&str, &[&str]); 7] = [
     ("Find robots in scans", &["run", "plan", "rescan", "inspect"]),
+    ("Do a run on many machines", &["shards", "shard", "gather"]),
     ("Look at results", &["report", "verify", "diff", "history"]),
     ("Use results", &["export", "check"]),
     ("Robot libraries", &["robots"]),
@@ -17,9 +18,11 @@ const GROUPS: [(&str, &[&str]); 6] = [
 
 /// Options about coordinates of inputs, and the commands that read inputs of their users.
 const OF_INPUTS: [&str; 2] = ["scanners", "units"];
-const READ_INPUTS: [&str; 5] = ["run", "plan", "rescan", "inspect", "config"];
+const READ_INPUTS: [&str; 8] =
+    ["run", "plan", "rescan", "shards", "shard", "gather", "inspect", "config"];
 /// Commands that search for robots, of which the method is chosen.
-const SEARCH: [&str; 6] = ["run", "plan", "rescan", "demo", "bench", "config"];
+const SEARCH: [&str; 9] =
+    ["run", "plan", "rescan", "shards", "shard", "gather", "demo", "bench", "config"];
 /// Commands that read small files or none: neither memory nor threads nor settings matter to them.
 const SMALL: [&str; 5] = ["diff", "history", "schema", "completions", "manual"];
 const OF_WORK: [&str; 5] = ["memory", "threads", "config", "set", "progress"];

@@ -19,6 +19,7 @@ mod robots;
 mod run;
 mod say;
 mod schema;
+mod shards;
 mod simulate;
 
 pub use answer::answer;
@@ -79,6 +80,9 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
         Command::Run(flags) => run::run(flags, &line.common, say),
         Command::Plan(flags) => run::plan(flags, &line.common, say),
         Command::Rescan(flags) => run::rescan(flags, &line.common, say),
+        Command::Shards(flags) => shards::list(flags, &line.common, say),
+        Command::Shard(flags) => shards::make(flags, &line.common, say),
+        Command::Gather(flags) => shards::gather(flags, &line.common, say),
         Command::Verify(flags) => results::verify(flags, &line.common, say),
         Command::Report(flags) => results::report(flags, &line.common, say),
         Command::Export(flags) => results::export(flags, &line.common, say),

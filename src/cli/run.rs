@@ -18,11 +18,22 @@ use std::time::Instant;
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
     let (job, engine) = job(flags, common)?;
     let started = Instant::now();
-    let mut outcome = keep_going::run(&job, &engine).map_err(|e| with_missing(e, &job, &engine))?;
-    record(&job, &engine, started, &outcome, say);
+    let outcome = keep_going::run(&job, &engine).map_err(|e| with_missing(e, &job, &engine))?;
+    Ok(ended(&job, &engine, started, outcome, say))
+}
+
+/// Says what a run has found, keeps its times, and returns the exit code.
+pub(super) fn ended(
+    job: &Job,
+    engine: &Engine,
+    started: Instant,
+    mut outcome: Outcome,
+    say: &Say,
+) -> u8 {
+    record(job, engine, started, &outcome, say);
     let _ = writeln!(outcome.summary, "result in {}", job.out.join("result.json").display());
     say.outcome(&outcome);
-    Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+    if outcome.partial { exit::PARTIAL } else { exit::OK }
 }
 
 pub(super) fn plan(flags: &PlanFlags, common: &Common, say: &Say) -> Result<u8> {
@@ -115,7 +126,7 @@ fn frame(wish: Option<&str>) -> Result<Frame> {
     }
 }
 
-fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {
+pub(super) fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {
     let mut means = common.means()?;
     means.settings.fit.calibrate |= flags.calibrate;
     if flags.lean {

@@ -33,6 +33,13 @@ pub(crate) struct Ground {
     pub(crate) extents: Vec<Option<LatticeExtent>>,
 }
 
+/// What the tiles of some scans add to the ground: the sum of the fold before it ends.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct GroundPart(<GatherGround as Fold>::Sum);
+
+/// The fold whose result is its sum.
+struct PartOf(GatherGround);
+
 impl Ground {
     /// Computes the ground in one pass over the tiles of a store.
     ///
@@ -45,6 +52,39 @@ impl Ground {
         engine: &Engine,
     ) -> Result<Self> {
         Self::gather(Surfaces::new(scans, &settings.lattice), scans, store, settings, engine)
+    }
+
+    /// What the tiles of some scans add to the ground.
+    ///
+    /// # Errors
+    /// A damaged tile; cancelled.
+    pub(crate) fn part(
+        scans: &[Scan],
+        store: &Store,
+        settings: &Settings,
+        engine: &Engine,
+    ) -> Result<GroundPart> {
+        let surfaces = Surfaces::new(scans, &settings.lattice);
+        let gather = PartOf(GatherGround::new(scans, &settings.floor));
+        let (source, reads) = (store.picks(|entry| surfaces.skip(entry)), store.reads());
+        engine.pass(store.task("surfaces"), source, |f| f.map(&reads).map(&surfaces).fold(&gather))
+    }
+
+    /// The ground of parts in the order of their scans: the same as that of all tiles.
+    ///
+    /// # Errors
+    /// Those of the fold.
+    pub(crate) fn join(
+        parts: impl IntoIterator<Item = Result<GroundPart>>,
+        scans: &[Scan],
+        settings: &Settings,
+    ) -> Result<Self> {
+        let gather = GatherGround::new(scans, &settings.floor);
+        let mut sum = gather.empty();
+        for part in parts {
+            gather.join(&mut sum, part?.0)?;
+        }
+        gather.finish(sum)
     }
 
     /// Like [`Ground::of_tiles`], without planes, for runs in which floor and walls are known.
@@ -132,6 +172,28 @@ impl Fold for GatherGround {
 
     fn finish(&self, sum: Self::Sum) -> Result<Ground> {
         Ok(Ground { surfaces: self.find.finish(sum.0)?, extents: sum.1 })
+    }
+}
+
+impl Fold for PartOf {
+    type In = Surface;
+    type Sum = <GatherGround as Fold>::Sum;
+    type Out = GroundPart;
+
+    fn empty(&self) -> Self::Sum {
+        self.0.empty()
+    }
+
+    fn add(&self, sum: &mut Self::Sum, item: Surface) -> Result<()> {
+        self.0.add(sum, item)
+    }
+
+    fn join(&self, earlier: &mut Self::Sum, later: Self::Sum) -> Result<()> {
+        self.0.join(earlier, later)
+    }
+
+    fn finish(&self, sum: Self::Sum) -> Result<GroundPart> {
+        Ok(GroundPart(sum))
     }
 }
 

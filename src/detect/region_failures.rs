@@ -18,6 +18,20 @@ impl RegionFailures {
         Self { is_forgiving: job.keep_going, list: Mutex::default() }
     }
 
+    /// Counts these regions as failed before: their messages, by region.
+    #[must_use]
+    pub(crate) fn with(self, known: &BTreeMap<String, String>) -> Self {
+        Self { list: Mutex::new(known.clone()), ..self }
+    }
+
+    /// The message about a region that failed.
+    pub(crate) fn message(region: &Region, error: &impl std::fmt::Display) -> String {
+        let [x, y, z] = region.world_bounds().center().coords.into();
+        format!(
+            "the search for robots near ({x:.1}, {y:.1}, {z:.1}) m failed and was left out: {error}"
+        )
+    }
+
     /// Runs `work` for a region. If it fails by a fault of the program and the job keeps going, the
     /// failure is recorded and the default value is returned.
     pub(crate) fn spare<T: Default>(
@@ -28,14 +42,14 @@ impl RegionFailures {
         if !self.is_forgiving {
             return work();
         }
+        let list = || self.list.lock().expect("nobody panics while he holds the list");
+        let name = format!("{region:?}");
+        if list().contains_key(&name) {
+            return Ok(T::default());
+        }
         match guarded("fit", 0, work) {
             Err(error) if error.kind() == Kind::Bug => {
-                let [x, y, z] = region.world_bounds().center().coords.into();
-                let what = format!(
-                    "the search for robots near ({x:.1}, {y:.1}, {z:.1}) m failed and was left out: {error}"
-                );
-                let mut list = self.list.lock().expect("nobody panics while he holds the list");
-                list.insert(format!("{region:?}"), what);
+                list().insert(name, Self::message(region, &error));
                 Ok(T::default())
             }
             done => done,

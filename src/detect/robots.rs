@@ -1,8 +1,10 @@
 //! The fits of a plant together with their models, and where the links of a fitted robot are.
 
 use contract::{Fit, Region};
+use export::ReviewEntry;
 use geometry::{Aabb, Point, Pose};
 use robot::Model;
+use serde::{Deserialize, Serialize};
 
 /// Fits of a plant and their models, borrowed.
 #[derive(Clone, Copy)]
@@ -17,6 +19,30 @@ pub(crate) struct FittedRobots<'a> {
 pub(crate) struct RobotList {
     pub(crate) fits: Vec<Fit>,
     pub(crate) models: Vec<Model>,
+}
+
+/// Reviewed robots as a piece of the store: without the models that stand in the library.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct KeptRobots {
+    pub(crate) fits: Vec<Fit>,
+    /// Models that follow those of the library.
+    own: Vec<Model>,
+    /// Effect of each entry of the review.
+    pub(crate) review: Vec<ReviewEntry>,
+}
+
+impl KeptRobots {
+    /// The robots of `list`, whose first models are the `n` of the library.
+    pub(crate) fn of(list: RobotList, n: usize, review: Vec<ReviewEntry>) -> Self {
+        let RobotList { fits, mut models } = list;
+        Self { fits, own: models.split_off(n.min(models.len())), review }
+    }
+
+    /// Fits and models, with those of the library, and the effects of the review.
+    pub(crate) fn with(self, library: &[Model]) -> (RobotList, Vec<ReviewEntry>) {
+        let models = library.iter().cloned().chain(self.own).collect();
+        (RobotList { fits: self.fits, models }, self.review)
+    }
 }
 
 impl RobotList {

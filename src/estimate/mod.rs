@@ -4,6 +4,7 @@
 mod expected_regions;
 mod rates;
 mod search_time;
+pub(crate) mod shard_costs;
 
 use crate::cache::{Digests, OutputDir};
 use crate::detect::library;

@@ -59,6 +59,16 @@ impl Job {
         let (scanners, review, keep_going, left_out) = (None, None, false, Vec::new());
         Self { inputs, robots, scanners, out, review, keep_going, left_out, means }
     }
+
+    /// Index of the input that an error is about, if the job can go on without it.
+    pub(crate) fn failed_input(&self, error: &Error) -> Option<usize> {
+        let is_of_file = matches!(error.kind(), Kind::BadInput | Kind::Unsupported | Kind::Io);
+        if !self.keep_going || !is_of_file || self.inputs.len() < 2 {
+            return None;
+        }
+        let place = error.place()?;
+        self.inputs.iter().position(|path| place.starts_with(&path.display().to_string()))
+    }
 }
 
 /// Memory, threads and settings of any command.
@@ -334,6 +344,21 @@ mod tests {
         assert_eq!((means.settings.fit.beam, means.settings.fit.thin), (99, 1.0));
         assert_eq!(means.settings.fit.plane_sigma, [0.1, 2.0]);
         assert_eq!(means.scanners, Some(dir.path().join("s.toml")));
+    }
+
+    #[test]
+    fn only_errors_of_an_input_are_forgiven() {
+        let job = |keep_going: bool| {
+            let inputs = vec!["a/one.e57".into(), "a/two.e57".into()];
+            let means = with(&[]).expect("defaults");
+            Job { keep_going, ..Job::new(inputs, "r".into(), "o".into(), means) }
+        };
+        let broken = Error::bad_input("damaged").at("page 3").at("a/two.e57");
+        assert_eq!(job(true).failed_input(&broken), Some(1));
+        assert_eq!(job(false).failed_input(&broken), None);
+        assert_eq!(job(true).failed_input(&Error::bad_input("damaged").at("b/two.e57")), None);
+        let full = Error::new(Kind::OverBudget, "the disk is full").at("a/two.e57");
+        assert_eq!(job(true).failed_input(&full), None);
     }
 
     #[test]

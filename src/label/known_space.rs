@@ -1,6 +1,7 @@
 //! Known space around each robot: which voxels beams have passed through, which the robot and
 //! others fill, and which no scan has seen. Points are marked in it while they are labelled.
 
+use crate::cache::Cache;
 use crate::detect::robots::{FittedRobots, poses, region, standing};
 use crate::detect::search::Search;
 use crate::engine::{AllThreads, Engine, Task};
@@ -32,20 +33,44 @@ pub(crate) struct KnownSpaces<'a, 's> {
 
 impl KnownSpaces<'_, '_> {
     /// The spaces of all robots, in the order of the fits; `None` where no scan has beams.
-    pub(crate) fn all(&self, engine: &Engine) -> Result<Vec<Option<Space>>> {
-        let FittedRobots { fits, models } = self.robots;
+    /// Where `kept` is given, spaces are taken from it or stored in it.
+    pub(crate) fn all(&self, kept: Option<&Cache>, engine: &Engine) -> Result<Vec<Option<Space>>> {
         if !self.settings.freespace.enabled {
-            return Ok(vec![None; fits.len()]);
+            return Ok(vec![None; self.robots.fits.len()]);
         }
+        let grids = self.grids().into_iter().enumerate().collect();
+        engine.fan_out(Task::new("space").large(), grids, |(i, grid)| {
+            let Some(grid) = grid else { return Ok(None) };
+            match kept {
+                Some(kept) => kept.get_or_compute(&Self::piece(i), || self.one(i, grid)),
+                None => self.one(i, grid),
+            }
+        })
+    }
+
+    /// Name of the space of a robot as a cached piece.
+    pub(crate) fn piece(robot: usize) -> String {
+        format!("space {robot}")
+    }
+
+    /// The grids of the spaces of all robots; `None` where spaces are not requested.
+    pub(crate) fn grids(&self) -> Vec<Option<SpaceGrid>> {
+        let FittedRobots { fits, models } = self.robots;
         let edge = self.settings.freespace.edge;
         let known = self.search.bounds().grown(edge);
-        engine.fan_out(Task::new("space").large(), (0..fits.len()).collect(), |i| {
-            let model = &models[fits[i].model];
-            let grid = SpaceGrid::over(&bounds(&fits[i], model.reach()).shared(&known), edge);
-            let mut space = self.seen(i, grid)?;
-            space.iter_mut().for_each(|space| self.fill_robots(space, i));
-            Ok(space)
-        })
+        let grid = |fit: &Fit| {
+            let reached = bounds(fit, models[fit.model].reach());
+            SpaceGrid::over(&reached.shared(&known), edge)
+        };
+        let is_wanted = self.settings.freespace.enabled;
+        fits.iter().map(|fit| is_wanted.then(|| grid(fit))).collect()
+    }
+
+    /// The space of one robot; `None` where no scan has beams.
+    pub(crate) fn one(&self, robot: usize, grid: SpaceGrid) -> Result<Option<Space>> {
+        let mut space = self.seen(robot, grid)?;
+        space.iter_mut().for_each(|space| self.fill_robots(space, robot));
+        Ok(space)
     }
 
     /// The voxels of `grid` that beams have passed through; `None` where no scan has beams.

@@ -17,7 +17,7 @@ use crate::io::read_parts::InputReader;
 use crate::job::Settings;
 use crate::store::Store;
 use attach::AttachedPieces;
-use contract::{Cluster, Fit, Floor, Input, InputId, Result, Space};
+use contract::{Cluster, Fit, Floor, Input, InputId, Mask, Result, Space};
 use export::{
     Clouds, FileSum, LasSettings, PROJECTION, Pack, PlanPicture, Quantum, RawVlr, RobotPicture,
     SpaceEntry, Spool, Tiles, WrittenFiles, write_space,
@@ -33,9 +33,9 @@ const SPOOLED: usize = 8;
 
 /// Job, scans, robots and floor that labelling reads.
 pub(crate) struct Labelling<'a> {
-    fits: &'a [Fit],
-    models: &'a [Model],
-    sources: &'a Sources,
+    pub(super) fits: &'a [Fit],
+    pub(super) models: &'a [Model],
+    pub(super) sources: &'a Sources,
     floor: &'a Floor,
     clusters: &'a [Cluster],
     ground: FloorHeights,
@@ -43,7 +43,7 @@ pub(crate) struct Labelling<'a> {
     attach: attach::Settings,
     /// Bounds of each scan's points, world frame, metres.
     bounds: Vec<Aabb>,
-    export: export::Settings,
+    pub(super) export: export::Settings,
     /// Clusters, where each point is to get the number of its cluster.
     bodies: Option<ClusterLookup>,
 }
@@ -93,6 +93,8 @@ pub(crate) struct Scope {
     pub(crate) las: Option<LasSettings>,
     /// Whether spatial tiles are left open, so that more points can be added.
     pub(crate) leaves_open: bool,
+    /// The only input that is read; `None` for all.
+    pub(crate) input: Option<InputId>,
 }
 
 /// Counts and names of the files that were written.
@@ -109,21 +111,23 @@ pub(crate) struct WrittenLabels {
     pub(crate) digests: Vec<FileSum>,
     /// Layout of the LAS records of clouds.
     pub(crate) las: LasSettings,
+    /// Messages about odd points of the inputs.
+    pub(crate) oddities: Vec<String>,
 }
 
 /// State after masks and clouds are written; the files of robots are written by
 /// [`Streamed::finish`].
 pub(crate) struct Streamed<'l> {
-    labelling: &'l Labelling<'l>,
-    near: &'l NearRobots,
+    pub(super) labelling: &'l Labelling<'l>,
+    pub(super) near: &'l NearRobots,
     /// Known space of each fit.
-    spaces: Vec<Option<Space>>,
+    pub(super) spaces: Vec<Option<Space>>,
     /// Indices of the fits whose files are written, with their pictures.
-    robots: Vec<(usize, RobotPicture)>,
+    pub(super) robots: Vec<(usize, RobotPicture)>,
     /// Tiles that were left open.
-    open: Vec<Spool>,
-    out: &'l Path,
-    done: WrittenLabels,
+    pub(super) open: Vec<Spool>,
+    pub(super) out: &'l Path,
+    pub(super) done: WrittenLabels,
 }
 
 impl Streamed<'_> {
@@ -217,7 +221,7 @@ impl<'a> Labelling<'a> {
         let records = export.records(&las);
         let mut tiles = Tiles::create(out, &records, &export)?;
         let mut clouds = Clouds::create(to.clouds, &records, &export)?;
-        let mut masks = Masks::new(out, self.sources.opened_masks());
+        let mut masks = Masks::new(out, self.masks_of(scope));
         let is_written = |i: &usize| scope.robots.as_ref().is_none_or(|r| r.contains(i));
         let chosen: Vec<usize> = (0..self.fits.len()).filter(is_written).collect();
         let mut robots = self.robot_pictures(&chosen, engine)?;
@@ -249,7 +253,9 @@ impl<'a> Labelling<'a> {
         let clouds = WrittenFiles { tiles, robots: moving, fixed };
         digests.extend(clouds.sums().cloned());
         let said = vec![None; self.fits.len()];
-        let done = WrittenLabels { clouds, masks, pictures, spaces: said, digests, las };
+        let oddities = self.read_inputs(scope).iter();
+        let oddities = oddities.flat_map(|input| self.sources.oddities_of(input.id)).collect();
+        let done = WrittenLabels { clouds, masks, pictures, spaces: said, digests, las, oddities };
         let robots = chosen.into_iter().zip(robots).collect();
         Ok(Streamed { labelling: self, near, spaces, robots, open, out, done })
     }
@@ -268,7 +274,7 @@ impl<'a> Labelling<'a> {
         let grids = SpaceGrids::of(spaces);
         let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
         let (disks, mut pictures) = (engine.disks()?, Vec::new());
-        for input in self.sources.opened() {
+        for input in self.read_inputs(scope) {
             let plan = PlanPicture::new(&self.bounds_of(input.id));
             let label = LabelStrip {
                 near: &near.labels,
@@ -293,6 +299,21 @@ impl<'a> Labelling<'a> {
             pictures.push(self.draw_plan(&plan, input.id, out)?);
         }
         Ok(pictures)
+    }
+
+    /// The inputs that are read, which are consecutive.
+    fn read_inputs(&self, scope: &Scope) -> &'a [Input] {
+        let all = self.sources.opened();
+        let at = scope.input.and_then(|id| all.iter().position(|input| input.id == id));
+        at.map_or(all, |at| &all[at..=at])
+    }
+
+    /// The masks of the inputs that are read.
+    fn masks_of(&self, scope: &Scope) -> &'a [Mask] {
+        let all = self.sources.opened_masks();
+        let Some(id) = scope.input else { return all };
+        let first = all.partition_point(|mask| mask.input < id);
+        &all[first..first + all[first..].partition_point(|mask| mask.input == id)]
     }
 
     /// Streams an input again and passes labelled strips on, in the order of the file.
@@ -329,7 +350,7 @@ impl<'a> Labelling<'a> {
         Ok((space, names))
     }
 
-    fn las(&self) -> LasSettings {
+    pub(super) fn las(&self) -> LasSettings {
         let with_color = self.sources.has_color();
         // Tiles are in the same coordinates as the LAS inputs, so that they share their system.
         let system = self.sources.system().into_iter().flat_map(|system| &system.records);
@@ -351,7 +372,11 @@ impl<'a> Labelling<'a> {
         Quantum::holding(&all, of_input.map(|(scale, offset)| Quantum { scale, offset }))
     }
 
-    fn robot_pictures(&self, chosen: &[usize], engine: &Engine) -> Result<Vec<RobotPicture>> {
+    pub(super) fn robot_pictures(
+        &self,
+        chosen: &[usize],
+        engine: &Engine,
+    ) -> Result<Vec<RobotPicture>> {
         engine.each(chosen.to_vec(), |i| {
             let fit = &self.fits[i];
             let model = &self.models[fit.model];
@@ -390,7 +415,7 @@ impl<'a> Labelling<'a> {
         Ok(name)
     }
 
-    fn bounds_of(&self, input: InputId) -> Aabb {
+    pub(super) fn bounds_of(&self, input: InputId) -> Aabb {
         let own = self.sources.scans.iter().zip(&self.bounds).filter(|(s, _)| s.input == input);
         own.fold(Aabb::EMPTY, |all, (_, bounds)| all.union(bounds))
     }

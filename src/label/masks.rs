@@ -4,10 +4,11 @@
 use super::label_strips::LabelledStrip;
 use contract::{Error, Kind, Mask, Result};
 use export::{FileSum, LabelColumns, MaskWriter};
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Numbers of entries of one mask.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(crate) struct MaskCount {
     pub(crate) n_points: u64,
     pub(crate) n_dropped: u64,

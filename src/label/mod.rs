@@ -2,6 +2,7 @@
 //! each robot.
 
 pub(crate) mod cluster_lookup;
+pub(crate) mod input_labels;
 pub(crate) mod known_space;
 pub(crate) mod label_strips;
 pub(crate) mod labelling;

@@ -1,11 +1,15 @@
 //! Labels of points near the fitted robots, sorted by place, and the bodies that are attached to
 //! each robot.
 
+use crate::cache::Cache;
 use crate::detect::robots::FittedRobots;
 use crate::engine::{AllThreads, Amount, Engine, Task};
 use crate::store::Store;
 use attach::{Attach, AttachedPieces};
-use contract::{Cluster, Floor, Fold, Label, MaskId, PlaceRun, Result, Scan, TileLabels};
+use contract::{
+    Cluster, Error, Floor, Fold, InputId, Kind, Label, Mask, MaskId, PlaceRun, Result, Scan,
+    TileLabels,
+};
 use segment::Segment;
 use std::ops::Range;
 
@@ -18,6 +22,14 @@ pub(crate) struct ScansNearRobots<'a> {
     pub(crate) scans: &'a [Scan],
     /// Number of masks of all inputs, including inputs without scans here.
     pub(crate) n_masks: usize,
+}
+
+/// Name of the piece with the bodies that are attached to robots.
+const HANGING: &str = "hanging";
+
+/// Name of the piece with the labels of an input.
+fn piece(input: InputId) -> String {
+    format!("near {}", input.0)
 }
 
 /// Labels of points near robots, and attached bodies.
@@ -68,6 +80,48 @@ impl NearRobots {
             PlaceRun::join(own);
         }
         Ok(Self { labels, hanging: attach::attached_pieces(&attached, fits, models) })
+    }
+
+    /// Stores the labels as pieces, one for each input, and the bodies as the last one.
+    pub(crate) fn keep(&self, kept: &Cache, masks: &[Mask]) -> Result<()> {
+        let mut rest = masks.iter().zip(&self.labels).peekable();
+        while let Some((first, _)) = rest.peek().copied() {
+            let mut own = Vec::new();
+            while let Some((_, runs)) = rest.next_if(|(mask, _)| mask.input == first.input) {
+                own.push(runs);
+            }
+            kept.keep(&piece(first.input), &own)?;
+        }
+        kept.keep(HANGING, &self.hanging)
+    }
+
+    /// Whether all pieces are stored.
+    pub(crate) fn is_kept(kept: &Cache) -> bool {
+        kept.has(HANGING)
+    }
+
+    /// The stored labels of the masks of one input, or of all, and the bodies.
+    ///
+    /// # Errors
+    /// A piece that is missing or damaged.
+    pub(crate) fn kept(kept: &Cache, masks: &[Mask], of: Option<InputId>) -> Result<Self> {
+        let lost = || {
+            Error::new(Kind::Io, "a piece with labels near robots is missing or damaged")
+                .hint("start the job again")
+        };
+        let mut labels: Vec<Vec<PlaceRun<Label>>> = vec![Vec::new(); masks.len()];
+        let is_wanted = |mask: &&Mask| of.is_none_or(|input| mask.input == input);
+        let mut at = 0;
+        while let Some(first) = masks[at..].iter().find(is_wanted) {
+            at = masks.partition_point(|mask| mask.input < first.input);
+            let own: Vec<_> = kept.get(&piece(first.input)).ok_or_else(lost)?;
+            for runs in own {
+                *labels.get_mut(at).ok_or_else(lost)? = runs;
+                at += 1;
+            }
+            at = at.max(masks.partition_point(|mask| mask.input <= first.input));
+        }
+        Ok(Self { labels, hanging: kept.get(HANGING).ok_or_else(lost)? })
     }
 
     /// Look-up of the labels of one mask, fast for neighbouring places.

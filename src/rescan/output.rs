@@ -117,6 +117,7 @@ impl RescanFindings<'_, '_> {
         let session = self.session;
         let spaces = self.spaces(engine)?;
         let scope = Scope {
+            input: None,
             robots: Some(self.robots.changed.clone()),
             cell: Some(session.past.cell),
             moved: session.moved(registered, self.carried.plant_from_new),

@@ -103,7 +103,7 @@ impl Report<'_> {
 
     fn warnings(&self) -> Vec<String> {
         let mut out = self.sources.warnings.clone();
-        out.extend(self.sources.oddities());
+        out.extend(self.written.oddities.iter().cloned());
         out.extend(self.left_out.iter().cloned());
         let odd = self.review.iter().filter(|entry| entry.needs_look);
         out.extend(odd.map(ReviewEntry::words));

@@ -17,6 +17,7 @@ mod moved;
 mod rescan;
 mod review;
 mod scans_back;
+mod shards;
 mod tamper;
 mod terminal;
 mod units;

@@ -1,7 +1,9 @@
 //! Labels of points: fixed, part of a robot, attachment, floor or uncertain.
 
+use serde::{Deserialize, Serialize};
+
 /// What a point belongs to; the numbers are those of `labels/N.kind.npy`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum PointKind {
     /// An object that does not move.
@@ -37,7 +39,7 @@ impl PointKind {
 }
 
 /// The label of one point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Label {
     /// What the point belongs to.
     pub kind: PointKind,

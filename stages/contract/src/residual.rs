@@ -83,7 +83,7 @@ impl TileLabels {
 
 /// A run of consecutive places of a mask with one value. Neighbouring points of a scan mostly have
 /// the same label, so runs are much shorter than one value a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct PlaceRun<T> {
     /// First place of the run.
     pub first: u64,

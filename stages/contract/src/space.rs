@@ -3,9 +3,10 @@
 
 use crate::{Label, PointKind};
 use geometry::Aabb;
+use serde::{Deserialize, Serialize};
 
 /// State of a voxel; the numbers are those of the output files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum SpaceKind {
     /// No beam passed through it and no point lies in it.
@@ -32,7 +33,7 @@ impl SpaceKind {
 }
 
 /// Placement of the voxels: aligned to whole multiples of the edge from the world's origin.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpaceGrid {
     /// Edge of a voxel, metres.
     pub edge: f64,
@@ -43,7 +44,7 @@ pub struct SpaceGrid {
 }
 
 /// The state of each voxel around one robot.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Space {
     grid: SpaceGrid,
     /// The voxels; z varies fastest, then y.

@@ -33,11 +33,15 @@ impl AtomicFile {
     /// If folder or file cannot be created.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let path = path.into();
+        let part = part_of(&path);
+        Self::open(path, part)
+    }
+
+    fn open(path: PathBuf, part: PathBuf) -> Result<Self> {
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder)
                 .map_err(|e| Error::of_file("folder cannot be created", folder, e))?;
         }
-        let part = part_of(&path);
         let file = OpenOptions::new()
             .create(true)
             .read(true)
@@ -122,6 +126,27 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     file.write_all(bytes).map_err(|e| Error::of_file("file cannot be written", path, e))?;
     file.commit()
+}
+
+/// Like [`write`], for a file that several processes, perhaps of several machines, may write at
+/// once: each writes under a temporary name of its own, and the last rename counts.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_shared(path: &Path, bytes: &[u8]) -> Result<()> {
+    let part = part_of(&path.with_extension(own_word()));
+    let mut file = AtomicFile::open(path.to_path_buf(), part)?;
+    file.write_all(bytes).map_err(|e| Error::of_file("file cannot be written", path, e))?;
+    file.commit()
+}
+
+/// A word for temporary names that no other process uses, not even one on another machine: numbers
+/// of processes repeat there, so the word is made of what the system draws for each hash table.
+#[must_use]
+pub fn own_word() -> String {
+    use std::hash::{BuildHasher, Hasher};
+    let drawn = std::collections::hash_map::RandomState::new().build_hasher().finish();
+    format!("{drawn:016x}")
 }
 
 /// The temporary name of a file.

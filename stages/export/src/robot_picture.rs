@@ -24,21 +24,21 @@ pub struct RobotPicture {
     robot: i16,
     bounds: Aabb,
     links: Vec<String>,
-    views: Vec<PictureView>,
+    pub(crate) views: Vec<PictureView>,
 }
 
-struct PictureView {
+pub(crate) struct PictureView {
     name: &'static str,
     /// Rows of the transform to pixels to the right, pixels down, and metres away from the viewer.
     view_from_world: Rows,
     /// Subtracted from points, so that `f32` is precise enough.
     origin: Point,
-    points: Vec<(f32, Rgb)>,
+    pub(crate) points: Vec<(f32, Rgb)>,
     outline: Vec<bool>,
     /// For each pixel the depth of the posture's surface and the cosine of its angle to the
     /// viewer, and the distance of the nearest point from it.
     surface: Vec<(f32, f32)>,
-    residuals: Vec<(f32, f32)>,
+    pub(crate) residuals: Vec<(f32, f32)>,
 }
 
 /// The part of the posture that is visible in a pixel.

@@ -22,7 +22,7 @@ pub struct Find {
 }
 
 /// State that is kept while summaries come in.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct FloorSum {
     n_points: u64,
     n_veils: u64,

@@ -4,6 +4,7 @@
 use contract::{Overlap, PlanePatch, ScanId};
 use geometry::Vector;
 use geometry::narrow::floor_i32;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Edge of the cells in which patches form one piece, metres: floors and walls are flat to two
@@ -21,11 +22,11 @@ const APART: f64 = 0.02;
 type SurfaceCell = ([i32; 3], u8);
 
 /// What each scan saw of each piece.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Overlaps(BTreeMap<SurfaceCell, Vec<ScanSurface>>);
 
 /// What one scan saw of one piece.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 struct ScanSurface {
     scan: ScanId,
     n: f64,

@@ -2,6 +2,7 @@
 //! They are read as a LAS file of one scanner is, so that the same points give the same scans.
 
 use crate::frame::NO_RETURN;
+use crate::looked::KeepNone;
 use crate::oddities::Oddities;
 use crate::place_look::PlaceLook;
 use crate::reader::{FileReading, MaskSeed, RawStrip, Reader, SampledPoint, ScanSeed, Want};
@@ -113,7 +114,7 @@ pub fn open_arrays(scans: Vec<ArrayScan>, settings: &Settings, fan: &dyn Fan) ->
         let reader = ArrayReader::new(scan, settings).map_err(|e| e.at(&name))?;
         sources.add_reader(name.into(), n_bytes, Box::new(reader));
     }
-    sources.find_lattices(settings, fan)?;
+    sources.find_lattices(settings, &KeepNone, fan)?;
     Ok(sources)
 }
 

@@ -69,11 +69,12 @@ pub use glance::{Glance, GlanceSample};
 pub use inspect::{
     BoundsText, Fact, InputDescription, LatticeText, PoseText, ScanDescription, describe,
 };
+pub use looked::{InputLooks, KeepLooks};
 pub use map::{Mapped, map};
 pub use position::MISPLACED;
 pub use reader::{Extent, Want};
 pub use regular::{read_text, regular};
 pub use scanners::{KnownScanner, KnownScanners};
 pub use settings::Settings;
-pub use sources::{Before, InputPiece, InputPieces, Sources, Strips, open, open_after};
+pub use sources::{Before, InputPiece, InputPieces, Sources, Strips, open, open_after, open_known};
 pub use units::{LengthUnit, Origin, ReferenceSystem, Units};

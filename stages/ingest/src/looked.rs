@@ -9,6 +9,7 @@ use crate::reader::SampledPoint;
 use crate::settings::Settings;
 use contract::{Result, Scan};
 use geometry::{Aabb, Point, Pose};
+use serde::{Deserialize, Serialize};
 
 /// Note on a scan from a depth camera.
 const CAMERA: &str = "taken by a depth camera: its ranges have errors of about half a percent, correlated over about 0.1 m";
@@ -24,7 +25,7 @@ const LEAST_POINTS: usize = 100;
 const TAIL: f64 = 0.05;
 
 /// The result of sampling a scan.
-#[derive(Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct ScanLook {
     /// The raster, where the scanner is known and the points suffice.
     pub(crate) raster: Option<ScanRaster>,
@@ -34,6 +35,31 @@ pub(crate) struct ScanLook {
     pub(crate) spread: Option<Aabb>,
     /// Whether the scanner cannot have stood at its stated position.
     pub(crate) is_misplaced: bool,
+}
+
+/// What samples of the scans of an input have told, for others that open the same input.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct InputLooks(pub(crate) Vec<ScanLook>);
+
+/// Keeps what samples have told. Each of many processes that open the same inputs would otherwise
+/// sample all of them.
+pub trait KeepLooks: Sync {
+    /// What is known of the input at this position among those that are opened.
+    fn known(&self, at: usize) -> Option<InputLooks>;
+
+    /// Keeps what was learnt of that input. What cannot be kept is learnt again.
+    fn keep(&self, at: usize, looks: &InputLooks);
+}
+
+/// Keeps nothing.
+pub(crate) struct KeepNone;
+
+impl KeepLooks for KeepNone {
+    fn known(&self, _: usize) -> Option<InputLooks> {
+        None
+    }
+
+    fn keep(&self, _: usize, _: &InputLooks) {}
 }
 
 impl OpenFile {

@@ -10,9 +10,10 @@ use crate::raster_native;
 use crate::reader::SampledPoint;
 use crate::settings::Settings;
 use contract::Lattice;
+use serde::{Deserialize, Serialize};
 
 /// Source of the steps of a lattice.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum StepSource {
     /// Native rows and columns: they map to pixels one to one.
     Native,
@@ -25,7 +26,7 @@ pub(crate) enum StepSource {
 }
 
 /// A lattice and the source of its steps.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct ScanRaster {
     pub(crate) lattice: Lattice,
     pub(crate) steps: StepSource,

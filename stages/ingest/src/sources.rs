@@ -5,6 +5,7 @@ use crate::file::OpenFile;
 
 use crate::format::detect;
 use crate::las::Las;
+use crate::looked::{InputLooks, KeepLooks, KeepNone};
 use crate::poses::Poses;
 use crate::raster::StepSource;
 use crate::reader::{self, Extent, FileReading, Reader, Want};
@@ -74,6 +75,20 @@ pub fn open(
     open_after(Before::default(), paths, scanners, settings, fan)
 }
 
+/// Opens inputs as [`open`] does. Scans are sampled only where `looks` knows nothing of them.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_known(
+    paths: &[PathBuf],
+    scanners: Option<&KnownScanners>,
+    settings: &Settings,
+    looks: &dyn KeepLooks,
+    fan: &dyn Fan,
+) -> Result<Sources> {
+    open_all(Before::default(), paths, scanners, settings, looks, fan)
+}
+
 /// Opens inputs as [`open`] does, numbered after the inputs of an earlier run.
 ///
 /// # Errors
@@ -83,6 +98,17 @@ pub fn open_after(
     paths: &[PathBuf],
     scanners: Option<&KnownScanners>,
     settings: &Settings,
+    fan: &dyn Fan,
+) -> Result<Sources> {
+    open_all(before, paths, scanners, settings, &KeepNone, fan)
+}
+
+fn open_all(
+    before: Before,
+    paths: &[PathBuf],
+    scanners: Option<&KnownScanners>,
+    settings: &Settings,
+    looks: &dyn KeepLooks,
     fan: &dyn Fan,
 ) -> Result<Sources> {
     let n_before = [before.inputs.len(), before.masks.len()];
@@ -99,7 +125,7 @@ pub fn open_after(
     for path in paths {
         sources.add(path, &mut poses, settings).map_err(|e| e.at(path.display()))?;
     }
-    sources.find_lattices(settings, fan)?;
+    sources.find_lattices(settings, looks, fan)?;
     sources.warnings.extend(poses.unused());
     let choice = Choice::read(&settings.units)?;
     let unknown = choice.unknown(paths);
@@ -231,14 +257,20 @@ impl Sources {
     /// Messages about odd points of the open inputs, from the last full read.
     #[must_use]
     pub fn oddities(&self) -> Vec<String> {
-        let of = |file: &OpenFile| -> Vec<String> {
-            let scans = file.reader.scans().iter().enumerate();
-            let said = scans.flat_map(|(i, scan)| {
-                file.reader.oddities(i).map(|odd| odd.said(&scan.name)).unwrap_or_default()
-            });
-            said.collect()
-        };
-        self.files.iter().flat_map(of).collect()
+        self.opened().iter().flat_map(|input| self.oddities_of(input.id)).collect()
+    }
+
+    /// Like [`Sources::oddities`], of one of the open inputs.
+    #[must_use]
+    pub fn oddities_of(&self, input: InputId) -> Vec<String> {
+        let first = self.inputs.len() - self.files.len();
+        let file = (input.0 as usize).checked_sub(first).and_then(|at| self.files.get(at));
+        let Some(file) = file else { return Vec::new() };
+        let scans = file.reader.scans().iter().enumerate();
+        let said = scans.flat_map(|(i, scan)| {
+            file.reader.oddities(i).map(|odd| odd.said(&scan.name)).unwrap_or_default()
+        });
+        said.collect()
     }
 
     /// Refuses inputs whose coordinates are too coarse to recognise a robot.
@@ -313,9 +345,19 @@ impl Sources {
 
     /// Samples each scan to estimate its raster and to check whether the scanner can have stood at
     /// its stated position.
-    pub(crate) fn find_lattices(&mut self, settings: &Settings, fan: &dyn Fan) -> Result<()> {
+    pub(crate) fn find_lattices(
+        &mut self,
+        settings: &Settings,
+        looks: &dyn KeepLooks,
+        fan: &dyn Fan,
+    ) -> Result<()> {
         let n_scans = |file: &OpenFile| file.reader.scans().len();
+        let known = |(f, file): (usize, &OpenFile)| {
+            looks.known(f).filter(|InputLooks(all)| all.len() == n_scans(file))
+        };
+        let known: Vec<Option<InputLooks>> = self.files.iter().enumerate().map(known).collect();
         let all = (self.files.iter().enumerate())
+            .filter(|(f, _)| known[*f].is_none())
             .flat_map(|(f, file)| (0..n_scans(file)).map(move |i| (f, i)))
             .collect();
         let scan_of = |file: &OpenFile, i: usize| file.first_scan as usize + i;
@@ -326,10 +368,17 @@ impl Sources {
             whole.map_err(|e| e.at(self.inputs[self.n_before[0] + f].path.display()))
         });
         let mut found = found.into_iter();
-        for file in &mut self.files {
-            for i in 0..n_scans(file) {
+        for (f, (file, known)) in self.files.iter_mut().zip(known).enumerate() {
+            let is_new = known.is_none();
+            let own = match known {
+                Some(known) => known,
+                None => InputLooks(found.by_ref().take(n_scans(file)).collect::<Result<_>>()?),
+            };
+            if is_new {
+                looks.keep(f, &own);
+            }
+            for (i, looked) in own.0.into_iter().enumerate() {
                 let at = scan_of(file, i);
-                let looked = found.next().transpose()?.unwrap_or_default();
                 self.scans[at].notes.extend(looked.note);
                 self.scans[at].lattice = looked.raster.as_ref().map(|r| r.lattice);
                 file.steps.push(looked.raster.map_or(StepSource::None, |r| r.steps));

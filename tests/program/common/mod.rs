@@ -31,6 +31,18 @@ pub(crate) fn boxed_cell(dir: &Path, scans: &str, seed: u64, n_beams: u64) {
     });
 }
 
+/// The cell with boxes, scanned into so many files: `robots`, and the folders `scans0`, `scans1`...
+pub(crate) fn cell_of_files(dir: &Path, n_files: usize, seed: u64, n_beams: u64) {
+    for file in 0..n_files {
+        simulated(dir, &format!("scans{file}"), (seed, n_beams), |mut scene| {
+            let all = scene.scanners.into_iter().enumerate();
+            let own = all.filter(|(i, _)| i % n_files == file).map(|(_, scanner)| scanner);
+            scene.scanners = own.collect();
+            scene
+        });
+    }
+}
+
 fn simulated(
     dir: &Path,
     scans: &str,
