@@ -22,6 +22,7 @@ mod io;
 pub mod job;
 mod label;
 pub mod plan;
+pub mod positions;
 pub mod rescan;
 pub mod result;
 pub mod store;

@@ -10,18 +10,19 @@ use crate::detect::review::Review;
 use crate::detect::robots::{FittedRobots, RobotList};
 use crate::detect::search::{PreparedLibrary, Search};
 use crate::detect::{library, tools};
-use crate::engine::{AllThreads, Engine, Task};
+use crate::engine::{Engine, Task};
 use crate::estimate::Estimate;
 use crate::job::{Job, Outcome, Settings, units};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
+use crate::positions;
 use crate::result::plant_state::{PlantState, Records};
 use crate::result::report::Report;
 use crate::result::{copc, page};
 use crate::store::{Store, spatial_tiles};
 use contract::{Cluster, Fit, Input, Result, Space};
 use export::{COPC, ReviewEntry};
-use ingest::{KnownScanners, Sources};
+use ingest::{Before, Sources};
 use robot::Library;
 
 /// Runs the main job: finds the robots in the scans and labels all points.
@@ -137,10 +138,7 @@ impl Run<'_> {
         let &Run { job, settings, output, digests, engine } = self;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let review = Review::of(job, &library.models)?;
-        let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
-        let scanners = job.scanners.as_deref().map(read).transpose()?;
-        let open = || ingest::open(&job.inputs, scanners.as_ref(), &settings.ingest, &AllThreads);
-        let sources = engine.pool()?.install(open)?;
+        let sources = positions::open(job, Before::default(), engine)?.sources;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         let has_tiles = |i: &Input| {

@@ -83,7 +83,7 @@ pub use record::{LasSettings, PROJECTION, Quantum, RawVlr, class_of};
 pub use refill::{OldPoint, StatedTile, read_tile};
 pub use result::{
     BasePose, BaseSigma, InputEntry, LabelFiles, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
-    SCHEMA, ScanLabels, StageEntry, TipPose, UnitsEntry,
+    SCHEMA, ScanEntry, ScanLabels, StageEntry, TipPose, UnitsEntry,
 };
 pub use review::ReviewEntry;
 pub use robot_model::{mesh_files, write_robot};

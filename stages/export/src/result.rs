@@ -8,7 +8,7 @@ use crate::places::NamedMap;
 use crate::review::ReviewEntry;
 use crate::session::RescanEntry;
 use crate::space::SpaceEntry;
-use contract::{Certainty, Fit, JointFit, Mask};
+use contract::{Certainty, Fit, JointFit, Mask, Scan, ScannerPosition};
 use geometry::Pose;
 use serde::{Deserialize, Serialize};
 
@@ -117,6 +117,10 @@ pub struct RobotEntry {
     /// Errors of the scans' stated poses near the robot.
     #[serde(default)]
     pub scans: Vec<ShiftEntry>,
+    /// Number of scans near the robot by how the positions of their scanners are known: `stated`,
+    /// `given`, `found` or `unknown`.
+    #[serde(default, skip_serializing_if = "NamedMap::is_empty")]
+    pub scanners: NamedMap<u32>,
     /// Numbers of the scans in which the robot has this posture, if it moved between scans; empty
     /// means all scans.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -288,6 +292,40 @@ pub struct InputEntry {
     pub units: Option<UnitsEntry>,
     /// Messages about what the file lacks and which results suffer from it.
     pub notes: Vec<String>,
+    /// The scans of the file, and how the positions of their scanners are known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scans: Vec<ScanEntry>,
+}
+
+/// A scan, and where its scanner stood.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ScanEntry {
+    /// Number of the scan, in the order of the inputs.
+    pub scan: u32,
+    /// Display name.
+    pub name: String,
+    /// How the position of the scanner is known: `stated` (by the file), `given` (with --scanners),
+    /// `found` (from the points) or `unknown`.
+    pub scanner: String,
+    /// Position of the scanner in the world, metres; missing where it is unknown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<[f64; 3]>,
+    /// Standard deviation of a found position along x, y, z, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<[f64; 3]>,
+}
+
+impl From<&Scan> for ScanEntry {
+    fn from(scan: &Scan) -> Self {
+        let is_known = scan.scanner != ScannerPosition::Unknown;
+        Self {
+            scan: scan.id.0,
+            name: scan.name.clone(),
+            scanner: scan.scanner.word().into(),
+            position: is_known.then(|| scan.world_from_scan.translation.vector.into()),
+            sigma: scan.scanner.sigma(),
+        }
+    }
 }
 
 /// Units of an input's coordinates.
@@ -358,6 +396,7 @@ impl RobotEntry {
             surface_sigma: finite(fit.surface_sigma),
             tip_sigma: finite(fit.tip_sigma),
             scans: fit.scans.iter().map(ShiftEntry::from).collect(),
+            scanners: NamedMap::default(),
             stands_in: fit.stands_in.iter().map(|s| s.0).collect(),
             space: None,
             slides: Vec::new(),

@@ -53,6 +53,7 @@ mod raster_free;
 mod raster_native;
 mod reader;
 mod regular;
+mod scan_of_point;
 mod scanners;
 mod settings;
 mod size;
@@ -60,6 +61,7 @@ mod sources;
 mod steps;
 mod text;
 mod units;
+mod windows;
 
 pub use glance::{Glance, GlanceSample};
 pub use inspect::{
@@ -73,3 +75,4 @@ pub use scanners::{KnownScanner, KnownScanners};
 pub use settings::Settings;
 pub use sources::{Before, InputPiece, InputPieces, Sources, Strips, open, open_after};
 pub use units::{LengthUnit, Origin, ReferenceSystem, Units};
+pub use windows::{PointWindow, WindowSample};

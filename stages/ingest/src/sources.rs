@@ -5,15 +5,17 @@ use crate::file::OpenFile;
 
 use crate::format::detect;
 use crate::las::Las;
+use crate::las_scans;
 use crate::poses::Poses;
 use crate::raster::StepSource;
 use crate::reader::{self, Extent, FileReading, Reader, Want};
 use crate::regular::regular;
-use crate::scanners::KnownScanners;
+use crate::scanners::{KnownScanner, KnownScanners};
 use crate::settings::Settings;
 use crate::units::{Choice, ReferenceSystem, Units};
 use contract::{
-    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
+    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, ScannerPosition,
+    Strip, Weigh,
 };
 use std::path::{Path, PathBuf};
 
@@ -314,6 +316,9 @@ impl Sources {
                 file.steps.push(looked.raster.map_or(StepSource::None, |r| r.steps));
                 file.spreads.push(looked.spread);
                 file.known[i] &= !looked.is_misplaced;
+                if looked.is_misplaced {
+                    self.scans[at].scanner = ScannerPosition::Unknown;
+                }
             }
         }
         Ok(())
@@ -328,6 +333,8 @@ impl Sources {
             mask: MaskId(file.first_mask + seed.mask as u32),
             name: seed.name.clone(),
             source_id: seed.source_id,
+            places: seed.places.clone(),
+            scanner: seed.position,
             world_from_scan: seed.world_from_scan,
             lattice: None,
             stated_bounds: seed.stated_bounds,
@@ -339,10 +346,15 @@ impl Sources {
             Format::E57 | Format::Ptx => poses.by_scan_name(&seed.name),
         };
         file.known.push(seed.scanner_known || replaced.is_some());
-        file.moved.push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
-        if let Some(pose) = replaced {
-            scan.world_from_scan = pose;
-            scan.notes.push("the scanner's position is that of --scanners, not of the file".into());
+        let moved = |known: &KnownScanner| known.world_from_scan.inverse() * seed.world_from_scan;
+        file.moved.push(replaced.map(moved));
+        if let Some(known) = replaced {
+            scan.world_from_scan = known.world_from_scan;
+            scan.scanner = known.position();
+            scan.notes.push(match scan.scanner {
+                ScannerPosition::Found { sigma } => las_scans::found_note(sigma),
+                _ => "the scanner's position is that of --scanners, not of the file".into(),
+            });
         }
         scan
     }

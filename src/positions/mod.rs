@@ -1,0 +1,48 @@
+//! Opens the inputs of a job, and finds the scanners of those that state none from their points.
+
+mod clouds;
+mod owned;
+mod stretches;
+mod words;
+
+pub use clouds::{CloudSetups, SetupOfCloud, find};
+pub use owned::Ownership;
+
+use crate::engine::{AllThreads, Engine};
+use crate::job::Job;
+use contract::Result;
+use ingest::{Before, KnownScanners, Sources};
+
+/// Opened inputs, and what was found of scanners that they do not state.
+pub(crate) struct OpenedInputs {
+    pub(crate) sources: Sources,
+    /// What was found in each cloud without a scanner; empty where nothing was looked for.
+    pub(crate) clouds: Vec<CloudSetups>,
+}
+
+/// Opens the inputs of a job after those of an earlier result, with the positions that the job
+/// gives; where it gives none, with those that are found in the points.
+///
+/// # Errors
+/// As [`ingest::open`].
+pub(crate) fn open(job: &Job, before: Before, engine: &Engine) -> Result<OpenedInputs> {
+    let settings = &job.means.settings.ingest;
+    let read = |path| KnownScanners::read(path, settings);
+    let given = job.scanners.as_deref().map(read).transpose()?;
+    let open = |before, scanners: Option<&KnownScanners>| {
+        engine
+            .pool()?
+            .install(|| ingest::open_after(before, &job.inputs, scanners, settings, &AllThreads))
+    };
+    let sources = open(before.clone(), given.as_ref())?;
+    let is_wanted = given.is_none() && job.find_scanners;
+    let clouds = if is_wanted { find(&sources, engine)? } else { Vec::new() };
+    let entries: Vec<_> = clouds.iter().flat_map(CloudSetups::entries).collect();
+    if entries.is_empty() {
+        let sources = words::with_causes(sources, &clouds);
+        return Ok(OpenedInputs { sources, clouds });
+    }
+    drop(sources);
+    let sources = open(before, Some(&KnownScanners { entries }))?;
+    Ok(OpenedInputs { sources: words::with_causes(sources, &clouds), clouds })
+}
