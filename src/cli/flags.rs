@@ -4,7 +4,7 @@
 use super::bench_flags::BenchCommand;
 use super::common::Common;
 use super::program_flags::{CompletionsFlags, ConfigCommand, ManualFlags, SchemaFlags};
-use super::scanners::ScannersFlags;
+use super::scanners_flags::ScannersFlags;
 use crate::check::PathDoubt;
 use crate::result::conversion::ExportFormat;
 use crate::result::mesh_export::MeshFormat;

@@ -18,6 +18,7 @@ mod robots;
 mod run;
 mod say;
 mod scanners;
+mod scanners_flags;
 mod schema;
 mod simulate;
 

@@ -4,28 +4,15 @@ use super::common::Common;
 use super::exit;
 use super::flags::present;
 use super::say::Say;
+use super::scanners_flags::ScannersFlags;
 use crate::job::Job;
 use crate::positions::{self, CloudSetups, SetupOfCloud};
-use clap::Args;
 use contract::words::{count, fixed};
 use contract::{Error, Kind, Result, ScannerPosition, quote};
 use export::atomic;
 use ingest::Sources;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-
-#[derive(Debug, Args)]
-pub(super) struct ScannersFlags {
-    /// Scan files: E57, PTX, LAS, LAZ
-    #[arg(required = true, value_name = "INPUT")]
-    inputs: Vec<PathBuf>,
-    /// Write the positions that were found to this file (TOML), for --scanners
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Print JSON
-    #[arg(long)]
-    json: bool,
-}
 
 /// Exit code 3 where a cloud has points whose scanner stays unknown.
 pub(super) fn scanners(flags: &ScannersFlags, common: &Common, say: &Say) -> Result<u8> {

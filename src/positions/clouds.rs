@@ -7,7 +7,7 @@ use crate::engine::{AllThreads, Engine};
 use contract::{Format, MaskId, Result, Scan, ScannerPosition};
 use ingest::{KnownScanner, PointWindow, Sources, WindowSample};
 use serde::Serialize;
-use setups::{Found, Setup, Window};
+use setups::{FoundSetups, Setup, Window};
 use std::path::Path;
 
 /// Number of windows of a cloud that are looked at first, and where these leave much unexplained or
@@ -115,8 +115,8 @@ fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
 }
 
 /// Windows of a cloud, and the setups in them; more windows where the first leave much open.
-fn looked(sources: &Sources, scan: &Scan) -> Result<(Vec<Window>, Found)> {
-    let mut last = (Vec::new(), Found::default());
+fn looked(sources: &Sources, scan: &Scan) -> Result<(Vec<Window>, FoundSetups)> {
+    let mut last = (Vec::new(), FoundSetups::default());
     for n_windows in WINDOWS {
         let sample = WindowSample { n_windows, n_points: WINDOW_POINTS };
         let read = sources.windows(scan.id, sample, &AllThreads)?;
@@ -124,7 +124,7 @@ fn looked(sources: &Sources, scan: &Scan) -> Result<(Vec<Window>, Found)> {
         if windows.len() == last.0.len() {
             break;
         }
-        let found = setups::find(&windows, &setups::Settings::default());
+        let found = setups::find(&windows, &setups::SetupLimits::default());
         let n_open = found.owners.iter().filter(|owner| owner.is_none()).count();
         let is_enough = windows.len() >= PER_SETUP * found.setups.len()
             && n_open as f64 <= UNEXPLAINED * windows.len() as f64;

@@ -10,7 +10,7 @@ pub use owned::Ownership;
 
 use crate::engine::{AllThreads, Engine};
 use crate::job::Job;
-use contract::Result;
+use contract::{Result, ScannerPosition};
 use ingest::{Before, KnownScanners, Sources};
 
 /// Opened inputs, and what was found of scanners that they do not state.
@@ -39,10 +39,22 @@ pub(crate) fn open(job: &Job, before: Before, engine: &Engine) -> Result<OpenedI
     let clouds = if is_wanted { find(&sources, engine)? } else { Vec::new() };
     let entries: Vec<_> = clouds.iter().flat_map(CloudSetups::entries).collect();
     if entries.is_empty() {
-        let sources = words::with_causes(sources, &clouds);
+        let sources = with_causes(sources, &clouds);
         return Ok(OpenedInputs { sources, clouds });
     }
     drop(sources);
     let sources = open(before, Some(&KnownScanners { entries }))?;
-    Ok(OpenedInputs { sources: words::with_causes(sources, &clouds), clouds })
+    Ok(OpenedInputs { sources: with_causes(sources, &clouds), clouds })
+}
+
+/// The sources with the cause in the notes of each scan whose scanner stays unknown.
+fn with_causes(mut sources: Sources, clouds: &[CloudSetups]) -> Sources {
+    for scan in &mut sources.scans {
+        let mut own = clouds.iter().filter(|cloud| cloud.mask == scan.mask);
+        let cause = own.find_map(|cloud| cloud.unknown.as_ref());
+        if let Some(cause) = cause.filter(|_| scan.scanner == ScannerPosition::Unknown) {
+            scan.notes.push(format!("the scanner's position was not found: {cause}"));
+        }
+    }
+    sources
 }

@@ -1,9 +1,6 @@
 //! What was found and what was not, in words.
 
-use super::clouds::CloudSetups;
-use contract::ScannerPosition;
-use ingest::Sources;
-use setups::{Found, Setup};
+use setups::{FoundSetups, Setup};
 
 /// The evidence of a setup.
 pub(super) fn evidence(setup: &Setup) -> String {
@@ -20,7 +17,7 @@ pub(super) fn evidence(setup: &Setup) -> String {
 }
 
 /// Why there is no setup, or none for some points, or why those found cannot be used.
-pub(super) fn unknown(found: &Found, is_alone: bool, n_usable: usize) -> Option<String> {
+pub(super) fn unknown(found: &FoundSetups, is_alone: bool, n_usable: usize) -> Option<String> {
     const NAME: &str =
         "several inputs have its name, so that no scanners file can mean it: rename the files";
     const MIXED: &str = "it is open which points are those of which scanner, or a position is too uncertain; a \
@@ -32,16 +29,4 @@ pub(super) fn unknown(found: &Found, is_alone: bool, n_usable: usize) -> Option<
         return Some(MIXED.to_owned());
     }
     found.cause.map(|cause| cause.words().to_owned())
-}
-
-/// The sources with the cause in the notes of each scan whose scanner stays unknown.
-pub(super) fn with_causes(mut sources: Sources, clouds: &[CloudSetups]) -> Sources {
-    for scan in &mut sources.scans {
-        let mut own = clouds.iter().filter(|cloud| cloud.mask == scan.mask);
-        let cause = own.find_map(|cloud| cloud.unknown.as_ref());
-        if let Some(cause) = cause.filter(|_| scan.scanner == ScannerPosition::Unknown) {
-            scan.notes.push(format!("the scanner's position was not found: {cause}"));
-        }
-    }
-    sources
 }

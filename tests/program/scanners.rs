@@ -238,7 +238,7 @@ fn a_run_uses_found_positions_says_so_and_is_the_same_again() {
 }
 
 /// Setups of the points of a real file in their order, with those that it states.
-fn of_real(name: &str) -> Option<(setups::Found, Vec<[f64; 3]>)> {
+fn of_real(name: &str) -> Option<(setups::FoundSetups, Vec<[f64; 3]>)> {
     let path =
         std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scans").join(name);
     if !path.exists() {
@@ -264,7 +264,7 @@ fn of_real(name: &str) -> Option<(setups::Found, Vec<[f64; 3]>)> {
     };
     let windows: Vec<setups::Window> = points.chunks(512).enumerate().map(window).collect();
     let at = sources.scans.iter().map(|s| s.world_from_scan.translation.vector.into()).collect();
-    Some((setups::find(&windows, &setups::Settings::default()), at))
+    Some((setups::find(&windows, &setups::SetupLimits::default()), at))
 }
 
 #[test]

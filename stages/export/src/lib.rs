@@ -52,6 +52,7 @@ mod result_file;
 mod review;
 mod robot_model;
 mod robot_picture;
+mod scan_entry;
 mod session;
 mod settings;
 mod space;
@@ -83,11 +84,12 @@ pub use record::{LasSettings, PROJECTION, Quantum, RawVlr, class_of};
 pub use refill::{OldPoint, StatedTile, read_tile};
 pub use result::{
     BasePose, BaseSigma, InputEntry, LabelFiles, LinkEntry, ResultFile, RobotEntry, RunnerUpEntry,
-    SCHEMA, ScanEntry, ScanLabels, StageEntry, TipPose, UnitsEntry,
+    SCHEMA, ScanLabels, StageEntry, TipPose, UnitsEntry,
 };
 pub use review::ReviewEntry;
 pub use robot_model::{mesh_files, write_robot};
 pub use robot_picture::RobotPicture;
+pub use scan_entry::ScanEntry;
 pub use session::{CarriedEntry, RegistrationEntry, RescanEntry};
 pub use settings::Settings;
 pub use space::{SpaceEntry, write_space};

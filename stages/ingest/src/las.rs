@@ -9,11 +9,11 @@ use crate::laz::LazStream;
 use crate::map::Mapped;
 use crate::oddities::Oddities;
 use crate::reader::{
-    Extent, FileReading, MaskSeed, RawStrip, Reader, SampledPoint, ScanSeed, Want,
+    Extent, FileReading, MaskSeed, PointWindow, RawStrip, Reader, SampledPoint, ScanSeed, Want,
+    WindowSample,
 };
 use crate::settings::Settings;
 use crate::units::{ReferenceSystem, Units};
-use crate::windows::{PointWindow, WindowSample};
 use contract::{Error, Format, Result};
 use std::path::Path;
 

@@ -69,10 +69,9 @@ pub use inspect::{
 };
 pub use map::{Mapped, map};
 pub use position::MISPLACED;
-pub use reader::{Extent, Want};
+pub use reader::{Extent, PointWindow, Want, WindowSample};
 pub use regular::{read_text, regular};
 pub use scanners::{KnownScanner, KnownScanners};
 pub use settings::Settings;
 pub use sources::{Before, InputPiece, InputPieces, Sources, Strips, open, open_after};
 pub use units::{LengthUnit, Origin, ReferenceSystem, Units};
-pub use windows::{PointWindow, WindowSample};

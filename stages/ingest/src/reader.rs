@@ -4,7 +4,6 @@
 use crate::map::Mapped;
 use crate::oddities::Oddities;
 use crate::units::{ReferenceSystem, Units};
-use crate::windows::{PointWindow, WindowSample};
 use contract::{Attributes, Error, Format, Kind, Result, ScannerPosition};
 use geometry::{Aabb, Pose};
 use std::ops::Range;
@@ -125,6 +124,26 @@ impl Extent {
         });
         all.filter(|extent| !extent.bytes.is_empty())
     }
+}
+
+/// Points that follow one another in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointWindow {
+    /// Place of the first point in its mask.
+    pub place: u64,
+    /// Its `point_source_id`, in LAS and LAZ files; else 0.
+    pub source_id: u16,
+    /// The points, world, metres.
+    pub points: Vec<[f64; 3]>,
+}
+
+/// How many windows are read, and how long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WindowSample {
+    /// Largest number of windows.
+    pub n_windows: u64,
+    /// Number of points of each.
+    pub n_points: u64,
 }
 
 /// How a file is read, in file order.

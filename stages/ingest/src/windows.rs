@@ -2,30 +2,10 @@
 //! scanner's position is found from.
 
 use crate::file::OpenFile;
-use crate::reader::{self, RawStrips, Want};
+use crate::reader::{self, PointWindow, RawStrips, Want, WindowSample};
 use crate::sources::Sources;
 use contract::{Fan, Result, ScanId};
 use geometry::{Point, Pose};
-
-/// Points that follow one another in a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PointWindow {
-    /// Place of the first point in its mask.
-    pub place: u64,
-    /// Its `point_source_id`, in LAS and LAZ files; else 0.
-    pub source_id: u16,
-    /// The points, world, metres.
-    pub points: Vec<[f64; 3]>,
-}
-
-/// How many windows are read, and how long.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WindowSample {
-    /// Largest number of windows.
-    pub n_windows: u64,
-    /// Number of points of each.
-    pub n_points: u64,
-}
 
 impl Sources {
     /// Windows of the points of a scan whose scanner is not known, in the order of the file. Of a

@@ -1,7 +1,7 @@
 //! Finds lines that the planes of many columns share: axes of scanners.
 
 use crate::planes::PlanarRun;
-use crate::setup::Settings;
+use crate::setup::SetupLimits;
 use geometry::Vector;
 use nalgebra::{Matrix4, Vector4};
 use rand::{RngExt, SeedableRng};
@@ -44,7 +44,7 @@ pub(crate) fn find(
     live: &[usize],
     refused: &[AxisLine],
     seed: u64,
-    settings: &Settings,
+    settings: &SetupLimits,
 ) -> Option<AxisLine> {
     if live.len() < FEWEST.0 {
         return None;

@@ -4,7 +4,7 @@ use crate::axis::{AxisLine, side};
 use crate::height::Height;
 use crate::planes::PlanarRun;
 use crate::refine::{CombPoint, ScannerFit};
-use crate::setup::{Evidence, Setup};
+use crate::setup::{Setup, SetupEvidence};
 use crate::tune;
 use geometry::{Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
@@ -280,7 +280,7 @@ fn evidence(
     fit: &ScannerFit,
     comb: [f64; 2],
     angle_sigmas: [f64; 2],
-) -> Evidence {
+) -> SetupEvidence {
     let mut cells: BTreeMap<(i64, i64), (usize, [f64; 2])> = BTreeMap::new();
     let mut all = [0.0, 0.0];
     for point in points {
@@ -302,7 +302,7 @@ fn evidence(
         .collect();
     let sum = phasors.iter().fold([0.0, 0.0], |s, p| [s[0] + p[0], s[1] + p[1]]);
     let power: f64 = phasors.iter().map(|p| p[0] * p[0] + p[1] * p[1]).sum();
-    Evidence {
+    SetupEvidence {
         n_planes: 0,
         n_points: points.len(),
         coherence: all[0].hypot(all[1]) / points.len().max(1) as f64,

@@ -7,13 +7,13 @@ use crate::height;
 use crate::owner::owners;
 use crate::planes::{self, PlanarRun};
 use crate::refine::wrapped;
-use crate::setup::{Cause, Settings, Setup, Window};
+use crate::setup::{Cause, Setup, SetupLimits, Window};
 use geometry::robust::median;
 use geometry::{Point, Vector};
 
 /// What was found in a cloud.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Found {
+pub struct FoundSetups {
     /// The setups, those of more columns first.
     pub setups: Vec<Setup>,
     /// For each window the setup from which it was measured, where that is clear.
@@ -32,10 +32,13 @@ const FEWEST: usize = 12;
 /// Finds the setups from which windows of points were measured. The answer depends on the windows
 /// and their order only.
 #[must_use]
-pub fn find(windows: &[Window], settings: &Settings) -> Found {
+pub fn find(windows: &[Window], settings: &SetupLimits) -> FoundSetups {
     let filled = windows.iter().filter(|w| w.points.len() >= settings.min_run_points).count();
-    let none =
-        |cause| Found { setups: Vec::new(), owners: vec![None; windows.len()], cause: Some(cause) };
+    let none = |cause| FoundSetups {
+        setups: Vec::new(),
+        owners: vec![None; windows.len()],
+        cause: Some(cause),
+    };
     if filled < FEWEST {
         return none(Cause::FewPoints);
     }
@@ -44,7 +47,7 @@ pub fn find(windows: &[Window], settings: &Settings) -> Found {
     if runs.len() < FEWEST {
         return none(Cause::NoColumns);
     }
-    let mut search = Search { windows, runs, origin, settings, setups: Vec::new() };
+    let mut search = SetupSearch { windows, runs, origin, settings, setups: Vec::new() };
     let cause = search.all();
     let mut setups = search.setups;
     setups.sort_by_key(|setup| std::cmp::Reverse(setup.evidence.n_planes));
@@ -52,7 +55,7 @@ pub fn find(windows: &[Window], settings: &Settings) -> Found {
     for (i, setup) in setups.iter_mut().enumerate() {
         setup.col_step = col_step(windows, &owners, i, setup);
     }
-    Found { setups, owners, cause }
+    FoundSetups { setups, owners, cause }
 }
 
 /// The median of the windows' first points, so that numbers stay small in any frame of the world.
@@ -65,15 +68,15 @@ fn origin(windows: &[Window]) -> Vector {
     Vector::new(along(0), along(1), along(2))
 }
 
-struct Search<'a> {
+struct SetupSearch<'a> {
     windows: &'a [Window],
     runs: Vec<PlanarRun>,
     origin: Vector,
-    settings: &'a Settings,
+    settings: &'a SetupLimits,
     setups: Vec<Setup>,
 }
 
-impl Search<'_> {
+impl SetupSearch<'_> {
     /// Finds all setups; says why there are no more, where runs are left.
     fn all(&mut self) -> Option<Cause> {
         let mut live: Vec<usize> = (0..self.runs.len()).collect();

@@ -46,10 +46,10 @@ fn profile(run: &PlanarRun, line: &AxisLine) -> Profile {
 /// The heights from which elevations of neighbours differ most evenly, by two measures: that of a
 /// cloud with most of its points, and that of a thinned one. The first is right far more often.
 pub(crate) fn find(profiles: &[Profile]) -> impl Iterator<Item = Height> + '_ {
-    [most_alike as Measure, least_alike].into_iter().filter_map(|m| by(profiles, m))
+    [most_alike as Unevenness, least_alike].into_iter().filter_map(|m| by(profiles, m))
 }
 
-fn by(profiles: &[Profile], measure: Measure) -> Option<Height> {
+fn by(profiles: &[Profile], measure: Unevenness) -> Option<Height> {
     let every = profiles.len().div_ceil(LOOKED.0).max(1);
     let looked: Vec<&[[f64; 2]]> =
         profiles.iter().step_by(every).map(|p| &p[..p.len().min(LOOKED.1)]).collect();
@@ -104,7 +104,7 @@ fn angles(profiles: &[&[[f64; 2]]], s: f64, out: &mut Vec<f64>) {
 }
 
 /// How unlike one another angles are, as share of a typical one; `None` for no angles.
-type Measure = fn(&mut [f64]) -> Option<f64>;
+type Unevenness = fn(&mut [f64]) -> Option<f64>;
 
 /// Median deviation of the angles from their median: small where most of them are one step.
 fn most_alike(angles: &mut [f64]) -> Option<f64> {

@@ -14,12 +14,12 @@
 //!    phases.
 //!
 //! A setup is reported only where the comb is so clear that chance gives it less than once in a
-//! million clouds, with all places and steps counted that were tried ([`Evidence`]). Otherwise the
+//! million clouds, with all places and steps counted that were tried ([`SetupEvidence`]). Otherwise the
 //! answer is *unknown*, with its [`Cause`].
 //!
 //! # Example
 //! ```
-//! use setups::{Settings, Window, find};
+//! use setups::{SetupLimits, Window, find};
 //!
 //! // A scanner at (4, 3, 1.7) in a room of 10 m × 7 m × 4 m; each window is a column of points.
 //! let at = [4.0, 3.0, 1.7];
@@ -34,7 +34,7 @@
 //!     };
 //!     Window { place: col * 400, source: 0, points: (0..400).map(point).collect() }
 //! }).collect();
-//! let found = find(&windows, &Settings::default());
+//! let found = find(&windows, &SetupLimits::default());
 //! let position = found.setups[0].position();
 //! assert!((0..3).all(|i| (position[i] - at[i]).abs() < 1e-4), "{position:?}");
 //! ```
@@ -52,6 +52,6 @@ mod setup;
 mod tests;
 mod tune;
 
-pub use find::{Found, find};
+pub use find::{FoundSetups, find};
 pub use owner::{is_own, owner, owners};
-pub use setup::{Cause, Evidence, Settings, Setup, Window};
+pub use setup::{Cause, Setup, SetupEvidence, SetupLimits, Window};

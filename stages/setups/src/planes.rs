@@ -1,6 +1,6 @@
 //! Cuts windows of points into runs that lie in planes: columns of a scanner, or parts of them.
 
-use crate::setup::{Settings, Window};
+use crate::setup::{SetupLimits, Window};
 use geometry::Vector;
 use geometry::robust::median;
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -76,7 +76,7 @@ const FINE: f64 = 0.000_6;
 const INDEPENDENT: f64 = 30.0;
 
 /// The runs of all windows; the points less `origin`.
-pub(crate) fn runs(windows: &[Window], origin: &Vector, settings: &Settings) -> Vec<PlanarRun> {
+pub(crate) fn runs(windows: &[Window], origin: &Vector, settings: &SetupLimits) -> Vec<PlanarRun> {
     let local: Vec<Vec<Vector>> = windows
         .iter()
         .map(|w| w.points.iter().map(|p| Vector::from(*p) - origin).collect())
@@ -102,7 +102,7 @@ pub(crate) fn runs(windows: &[Window], origin: &Vector, settings: &Settings) -> 
 
 /// The largest deviation from a plane that is accepted in this cloud, metres: some times that of
 /// its better runs. Runs over two columns deviate more.
-fn limit(windows: &[Vec<Vector>], settings: &Settings) -> f64 {
+fn limit(windows: &[Vec<Vector>], settings: &SetupLimits) -> f64 {
     let n = settings.min_run_points;
     let mut all = Vec::new();
     for points in windows.iter().filter(|points| points.len() >= n) {
@@ -130,7 +130,7 @@ fn is_wide(spread: &Spread) -> bool {
 fn cut(
     points: &[Vector],
     limit: f64,
-    settings: &Settings,
+    settings: &SetupLimits,
     mut take: impl FnMut(usize, usize, Spread),
 ) {
     let least = settings.min_run_points;

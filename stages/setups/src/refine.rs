@@ -32,7 +32,7 @@ pub(crate) struct ScannerFit {
 }
 
 /// The state of the normal equations at one fit.
-pub(crate) struct Normal {
+pub(crate) struct NormalEquations {
     hessian: Matrix6<f64>,
     gradient: Vector6<f64>,
     /// Standard deviations of the elevations about the comb and of the points about the planes,
@@ -110,7 +110,7 @@ impl ScannerFit {
 
     /// The next fit by one step of least squares, and the equations at this one. `None` where they
     /// leave something undetermined.
-    pub(crate) fn improved(&self, points: &[CombPoint]) -> Option<(Self, Normal)> {
+    pub(crate) fn improved(&self, points: &[CombPoint]) -> Option<(Self, NormalEquations)> {
         let normal = self.normal(points)?;
         let x = normal.hessian.cholesky()?.solve(&-normal.gradient);
         let turn = self.pose.rotation;
@@ -121,14 +121,14 @@ impl ScannerFit {
         Some((Self { pose, step: self.step + x[5] }, normal))
     }
 
-    fn normal(&self, points: &[CombPoint]) -> Option<Normal> {
+    fn normal(&self, points: &[CombPoint]) -> Option<NormalEquations> {
         let (rows, sigmas) = self.rows(points)?;
         let (mut hessian, mut gradient) = (Matrix6::zeros(), Vector6::zeros());
         for row in &rows {
             hessian += row.slope * row.slope.transpose() * row.weight;
             gradient += row.slope * (row.weight * row.residual);
         }
-        Some(Normal { hessian, gradient, sigmas, rows })
+        Some(NormalEquations { hessian, gradient, sigmas, rows })
     }
 
     /// The equations of all points, less the mean of their groups: phases of elevation and azimuths
@@ -204,7 +204,7 @@ fn centred(rows: &mut [WeightedRow], group: impl Fn(&WeightedRow) -> u32) -> Opt
     Some(sigma)
 }
 
-impl Normal {
+impl NormalEquations {
     /// Standard deviations of the position along the axes of the scanner, metres, from how much the
     /// pulls of runs and of bins of elevation differ: points of one column, and those of one
     /// elevation, share errors.

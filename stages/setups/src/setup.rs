@@ -13,9 +13,9 @@ pub struct Window {
     pub points: Vec<[f64; 3]>,
 }
 
-/// Settings of the search. None of them decides whether a found setup is accepted.
+/// SetupLimits of the search. None of them decides whether a found setup is accepted.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct SetupLimits {
     /// Largest deviation of a run of points from its plane, metres RMS. Coarse old scanners have
     /// 10 mm.
     pub max_plane_rms: f64,
@@ -27,7 +27,7 @@ pub struct Settings {
     pub max_setups: usize,
 }
 
-impl Default for Settings {
+impl Default for SetupLimits {
     fn default() -> Self {
         Self { max_plane_rms: 0.012, min_run_points: 40, n_pairs: 3_000, max_setups: 512 }
     }
@@ -35,7 +35,7 @@ impl Default for Settings {
 
 /// How clear a setup is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Evidence {
+pub struct SetupEvidence {
     /// Number of runs of points whose planes contain the axis.
     pub n_planes: usize,
     /// Number of points of which the elevations were compared with the comb.
@@ -70,7 +70,7 @@ pub struct Setup {
     /// so that the file's own direction of columns tells the sides apart.
     pub(crate) by_direction: bool,
     /// How clear it is.
-    pub evidence: Evidence,
+    pub evidence: SetupEvidence,
 }
 
 impl Setup {

@@ -1,6 +1,6 @@
 //! Rooms with furniture, drawn from seeds, measured by scanners with the errors of real ones.
 
-use crate::{Cause, Settings, Setup, Window, find};
+use crate::{Cause, Setup, SetupLimits, Window, find};
 use geometry::{Pose, Vector};
 use nalgebra::UnitQuaternion;
 use rand::{RngExt, SeedableRng};
@@ -167,7 +167,7 @@ fn setups_of_drawn_rooms_are_found_to_parts_of_a_millimetre_and_none_is_invented
     for (seed, n) in [(1, 1), (2, 3), (3, 5)] {
         let errors = Errors { jitter: 2.5e-5 * seed as f64, ..PLAIN };
         let (windows, places) = drawn(seed, n, errors);
-        let found = find(&windows, &Settings::default());
+        let found = find(&windows, &SetupLimits::default());
         assert_eq!(found.setups.len(), n, "seed {seed}");
         for at in &places {
             let best = found
@@ -194,7 +194,7 @@ fn setups_of_drawn_rooms_are_found_to_parts_of_a_millimetre_and_none_is_invented
 fn columns_that_go_on_over_the_top_are_one_comb() {
     let errors = Errors { over_the_top: true, ..PLAIN };
     let (windows, places) = drawn(11, 2, errors);
-    let found = find(&windows, &Settings::default());
+    let found = find(&windows, &SetupLimits::default());
     assert_eq!(found.setups.len(), 2);
     for at in &places {
         assert!(found.setups.iter().any(|setup| error(setup, at) < 0.001));
@@ -206,7 +206,7 @@ fn an_axis_may_lie_and_a_frame_may_be_far() {
     let (mut windows, places) = drawn(21, 1, PLAIN);
     let far = |[x, y, z]: [f64; 3]| [z + 431_000.0, x + 5_400_000.0, y + 320.0];
     windows.iter_mut().flat_map(|w| &mut w.points).for_each(|p| *p = far(*p));
-    let found = find(&windows, &Settings::default());
+    let found = find(&windows, &SetupLimits::default());
     let at = Vector::from(far(places[0].into()));
     assert_eq!(found.setups.len(), 1);
     assert!(error(&found.setups[0], &at) < 0.001);
@@ -221,11 +221,11 @@ fn without_order_nothing_is_invented() {
     for i in (1..points.len()).rev() {
         points.swap(i, (random.between(0.0, 1.0) * i as f64) as usize);
     }
-    let found = find(&self::windows(&points, 400), &Settings::default());
+    let found = find(&self::windows(&points, 400), &SetupLimits::default());
     assert_eq!((found.setups.len(), found.cause), (0, Some(Cause::NoColumns)));
-    let few = find(&windows[..5], &Settings::default());
+    let few = find(&windows[..5], &SetupLimits::default());
     assert_eq!((few.setups.len(), few.cause), (0, Some(Cause::FewPoints)));
-    assert_eq!(find(&[], &Settings::default()).cause, Some(Cause::FewPoints));
+    assert_eq!(find(&[], &SetupLimits::default()).cause, Some(Cause::FewPoints));
 }
 
 /// A profile scanner that is carried along a path: no place is that of a scanner.
@@ -259,7 +259,7 @@ fn carried(seed: u64) -> Vec<Window> {
 #[test]
 fn a_scanner_that_is_carried_has_no_setup() {
     for seed in 41..47 {
-        let found = find(&carried(seed), &Settings::default());
+        let found = find(&carried(seed), &SetupLimits::default());
         assert!(
             found.setups.is_empty() && found.cause.is_some(),
             "seed {seed}: {:?}",
@@ -276,7 +276,7 @@ fn odd_points_do_no_harm() {
     let windows: Vec<Window> = (0..40)
         .map(|i| Window { place: i, source: 0, points: (0..200).map(|_| point()).collect() })
         .collect();
-    assert!(find(&windows, &Settings::default()).setups.is_empty());
+    assert!(find(&windows, &SetupLimits::default()).setups.is_empty());
     let same = Window { place: 0, source: 0, points: vec![[1.0, 2.0, 3.0]; 512] };
-    assert!(find(&vec![same; 50], &Settings::default()).setups.is_empty());
+    assert!(find(&vec![same; 50], &SetupLimits::default()).setups.is_empty());
 }

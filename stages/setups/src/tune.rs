@@ -11,7 +11,7 @@ const LOOKED: usize = 5_000;
 
 /// One round: length of the stretches, points; reach and interval of the places, metres; reach and
 /// interval of the steps, shares of the step.
-struct Round {
+struct TuningRound {
     length: u32,
     places: (f64, f64),
     steps: (f64, f64),
@@ -19,10 +19,10 @@ struct Round {
 
 /// The rounds. An interval turns the phase across a stretch by about a tenth, at a range of 3 m and
 /// steps of 0.1°; the reach is a few intervals of the round before.
-const ROUNDS: [Round; 3] = [
-    Round { length: 32, places: (0.048, 0.008), steps: (0.02, 0.003) },
-    Round { length: 128, places: (0.012, 0.002), steps: (0.004, 0.000_8) },
-    Round { length: 512, places: (0.004, 0.000_7), steps: (0.001, 0.000_2) },
+const ROUNDS: [TuningRound; 3] = [
+    TuningRound { length: 32, places: (0.048, 0.008), steps: (0.02, 0.003) },
+    TuningRound { length: 128, places: (0.012, 0.002), steps: (0.004, 0.000_8) },
+    TuningRound { length: 512, places: (0.004, 0.000_7), steps: (0.001, 0.000_2) },
 ];
 
 /// The fit with the place and the step from which stretches are the clearest combs.
@@ -33,7 +33,7 @@ pub(crate) fn tuned(points: &[CombPoint], start: ScannerFit) -> ScannerFit {
     ROUNDS.iter().fold(start, |fit, round| round.best(&looked, fit))
 }
 
-impl Round {
+impl TuningRound {
     fn best(&self, points: &[CombPoint], fit: ScannerFit) -> ScannerFit {
         let n = (self.places.0 / self.places.1).round() as i32;
         let axis = fit.pose.rotation * Vector::z();

@@ -61,7 +61,7 @@ impl Order {
 
 /// Points with the scans that they are of.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Cloud {
+pub(super) struct DrawnCloud {
     pub(super) points: Vec<[f64; 3]>,
     /// Number of the true scan of each point.
     pub(super) scan: Vec<u16>,
@@ -77,7 +77,7 @@ const N_PROFILES: usize = 500;
 /// Edge of a tile, metres.
 const TILE: f64 = 5.0;
 
-impl Cloud {
+impl DrawnCloud {
     /// A hall of a seed, with a number of setups within bounds and at most so many beams.
     pub(super) fn drawn(
         seed: u64,

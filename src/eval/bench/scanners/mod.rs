@@ -9,7 +9,7 @@ use super::request::DrawnCases;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
 use crate::positions::{self, CloudSetups, Ownership};
-use cloud::{Cloud, Order};
+use cloud::{DrawnCloud, Order};
 use contract::{Error, Result};
 use row::{FoundScanners, ScannersRow};
 use std::path::Path;
@@ -56,12 +56,12 @@ fn hall(
     engine: &Engine,
 ) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| Error::from(e).at(dir.display()))?;
-    let drawn = Cloud::drawn(row.seed, bench.n_setups, bench.n_beams, engine)?;
+    let drawn = DrawnCloud::drawn(row.seed, bench.n_setups, bench.n_beams, engine)?;
     row.drawn = drawn.drawn.clone();
     for order in Order::ALL {
         engine.cancel.check()?;
         let carried = match order {
-            Order::Carried => Some(Cloud::carried(row.seed, engine)?),
+            Order::Carried => Some(DrawnCloud::carried(row.seed, engine)?),
             _ => None,
         };
         let cloud = carried.as_ref().unwrap_or(&drawn).in_order(order, row.seed);
@@ -80,7 +80,12 @@ fn hall(
 }
 
 /// What was found, beside the truth.
-fn compared(cloud: &Cloud, order: Order, found: &[CloudSetups], seconds: f64) -> FoundScanners {
+fn compared(
+    cloud: &DrawnCloud,
+    order: Order,
+    found: &[CloudSetups],
+    seconds: f64,
+) -> FoundScanners {
     let mut out = FoundScanners {
         order: order.word().into(),
         n_points: cloud.points.len(),
@@ -116,7 +121,7 @@ fn compared(cloud: &Cloud, order: Order, found: &[CloudSetups], seconds: f64) ->
     out
 }
 
-impl Cloud {
+impl DrawnCloud {
     /// Number of points that an ownership gives to a setup, rightly and wrongly.
     fn owned(&self, ownership: &Ownership, truth: usize) -> [usize; 2] {
         let mut counts = [0, 0];
