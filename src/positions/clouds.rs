@@ -7,7 +7,7 @@ use crate::engine::{AllThreads, Engine};
 use contract::{Format, MaskId, Result, Scan, ScannerPosition};
 use ingest::{KnownScanner, PointWindow, Sources, WindowSample};
 use serde::Serialize;
-use setups::{FoundSetups, Setup, Window};
+use setups::{FoundSetups, ScanWindow, Setup};
 use std::path::Path;
 
 /// Number of windows of a cloud that are looked at first, and where these leave much unexplained or
@@ -115,12 +115,12 @@ fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
 }
 
 /// Windows of a cloud, and the setups in them; more windows where the first leave much open.
-fn looked(sources: &Sources, scan: &Scan) -> Result<(Vec<Window>, FoundSetups)> {
+fn looked(sources: &Sources, scan: &Scan) -> Result<(Vec<ScanWindow>, FoundSetups)> {
     let mut last = (Vec::new(), FoundSetups::default());
     for n_windows in WINDOWS {
         let sample = WindowSample { n_windows, n_points: WINDOW_POINTS };
         let read = sources.windows(scan.id, sample, &AllThreads)?;
-        let windows: Vec<Window> = read.into_iter().map(window).collect();
+        let windows: Vec<ScanWindow> = read.into_iter().map(window).collect();
         if windows.len() == last.0.len() {
             break;
         }
@@ -137,8 +137,8 @@ fn looked(sources: &Sources, scan: &Scan) -> Result<(Vec<Window>, FoundSetups)> 
     Ok(last)
 }
 
-fn window(read: PointWindow) -> Window {
-    Window { place: read.place, source: u32::from(read.source_id), points: read.points }
+fn window(read: PointWindow) -> ScanWindow {
+    ScanWindow { place: read.place, source: u32::from(read.source_id), points: read.points }
 }
 
 /// Whether the name of a scan names it alone, so that an entry of a scanners file can mean it.

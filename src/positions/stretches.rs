@@ -4,7 +4,7 @@
 use super::owned::Ownership;
 use contract::{Format, Result, Scan};
 use ingest::{Sources, Want};
-use setups::{FoundSetups, Setup, Window, owner};
+use setups::{FoundSetups, ScanWindow, Setup, owner};
 use std::collections::BTreeMap;
 
 /// Share of the owned windows of a source id, or of a file, that must have one setup.
@@ -28,7 +28,7 @@ const SHORT: u64 = 256;
 pub(super) fn of_setups(
     sources: &Sources,
     scan: &Scan,
-    windows: &[Window],
+    windows: &[ScanWindow],
     found: &FoundSetups,
 ) -> Result<Vec<Ownership>> {
     let n = found.setups.len();
@@ -58,7 +58,7 @@ pub(super) fn of_setups(
 }
 
 /// The source id of each setup, where ids tell all of them apart.
-fn by_source(windows: &[Window], found: &FoundSetups) -> Option<Vec<Ownership>> {
+fn by_source(windows: &[ScanWindow], found: &FoundSetups) -> Option<Vec<Ownership>> {
     let mut of_id: BTreeMap<u32, (usize, BTreeMap<usize, usize>)> = BTreeMap::new();
     for (window, owner) in windows.iter().zip(&found.owners) {
         let counts = of_id.entry(window.source).or_default();
@@ -90,7 +90,7 @@ fn by_source(windows: &[Window], found: &FoundSetups) -> Option<Vec<Ownership>> 
 fn between_windows(
     sources: &Sources,
     scan: &Scan,
-    windows: &[Window],
+    windows: &[ScanWindow],
     found: &FoundSetups,
 ) -> Result<Option<Vec<Vec<[u64; 2]>>>> {
     let all = windows.iter().zip(&found.owners).enumerate();

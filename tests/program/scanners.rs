@@ -257,12 +257,12 @@ fn of_real(name: &str) -> Option<(setups::FoundSetups, Vec<[f64; 3]>)> {
                 .map(|p| -> [f64; 3] { (pose * nalgebra::Point3::from(p.map(f64::from))).into() }),
         );
     }
-    let window = |(i, points): (usize, &[[f64; 3]])| setups::Window {
+    let window = |(i, points): (usize, &[[f64; 3]])| setups::ScanWindow {
         place: i as u64 * 512,
         source: 0,
         points: points.to_vec(),
     };
-    let windows: Vec<setups::Window> = points.chunks(512).enumerate().map(window).collect();
+    let windows: Vec<setups::ScanWindow> = points.chunks(512).enumerate().map(window).collect();
     let at = sources.scans.iter().map(|s| s.world_from_scan.translation.vector.into()).collect();
     Some((setups::find(&windows, &setups::SetupLimits::default()), at))
 }

@@ -7,7 +7,7 @@ use crate::height;
 use crate::owner::owners;
 use crate::planes::{self, PlanarRun};
 use crate::refine::wrapped;
-use crate::setup::{Cause, Setup, SetupLimits, Window};
+use crate::setup::{Cause, ScanWindow, Setup, SetupLimits};
 use geometry::robust::median;
 use geometry::{Point, Vector};
 
@@ -32,7 +32,7 @@ const FEWEST: usize = 12;
 /// Finds the setups from which windows of points were measured. The answer depends on the windows
 /// and their order only.
 #[must_use]
-pub fn find(windows: &[Window], settings: &SetupLimits) -> FoundSetups {
+pub fn find(windows: &[ScanWindow], settings: &SetupLimits) -> FoundSetups {
     let filled = windows.iter().filter(|w| w.points.len() >= settings.min_run_points).count();
     let none = |cause| FoundSetups {
         setups: Vec::new(),
@@ -59,7 +59,7 @@ pub fn find(windows: &[Window], settings: &SetupLimits) -> FoundSetups {
 }
 
 /// The median of the windows' first points, so that numbers stay small in any frame of the world.
-fn origin(windows: &[Window]) -> Vector {
+fn origin(windows: &[ScanWindow]) -> Vector {
     let first: Vec<&[f64; 3]> = windows.iter().filter_map(|w| w.points.first()).collect();
     let along = |axis: usize| {
         let mut values: Vec<f64> = first.iter().map(|p| p[axis]).collect();
@@ -69,7 +69,7 @@ fn origin(windows: &[Window]) -> Vector {
 }
 
 struct SetupSearch<'a> {
-    windows: &'a [Window],
+    windows: &'a [ScanWindow],
     runs: Vec<PlanarRun>,
     origin: Vector,
     settings: &'a SetupLimits,
@@ -124,7 +124,12 @@ impl SetupSearch<'_> {
 
 /// The azimuth between columns that follow one another in a window of a setup, radians: the median
 /// of the steps from one column to the next.
-fn col_step(windows: &[Window], owners: &[Option<usize>], setup: usize, of: &Setup) -> Option<f64> {
+fn col_step(
+    windows: &[ScanWindow],
+    owners: &[Option<usize>],
+    setup: usize,
+    of: &Setup,
+) -> Option<f64> {
     /// Least and largest step that counts as one between neighbouring columns, in steps of
     /// elevation.
     const NEIGHBOURS: (f64, f64) = (0.2, 5.0);

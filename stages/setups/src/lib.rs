@@ -14,16 +14,16 @@
 //!    phases.
 //!
 //! A setup is reported only where the comb is so clear that chance gives it less than once in a
-//! million clouds, with all places and steps counted that were tried ([`SetupEvidence`]). Otherwise the
-//! answer is *unknown*, with its [`Cause`].
+//! million clouds, with all places and steps counted that were tried ([`SetupEvidence`]).
+//! Otherwise the answer is *unknown*, with its [`Cause`].
 //!
 //! # Example
 //! ```
-//! use setups::{SetupLimits, Window, find};
+//! use setups::{SetupLimits, ScanWindow, find};
 //!
 //! // A scanner at (4, 3, 1.7) in a room of 10 m × 7 m × 4 m; each window is a column of points.
 //! let at = [4.0, 3.0, 1.7];
-//! let windows: Vec<Window> = (0..180).map(|col| {
+//! let windows: Vec<ScanWindow> = (0..180).map(|col| {
 //!     let azimuth = col as f64 * 0.0351;
 //!     let point = |row: i32| {
 //!         let (rise, flat) = (f64::from(row) * 0.004 - 0.9).sin_cos();
@@ -32,7 +32,7 @@
 //!         let range = (0..3).map(|i| to(i) / along[i]).fold(f64::INFINITY, f64::min);
 //!         [0, 1, 2].map(|i| at[i] + range * along[i])
 //!     };
-//!     Window { place: col * 400, source: 0, points: (0..400).map(point).collect() }
+//!     ScanWindow { place: col * 400, source: 0, points: (0..400).map(point).collect() }
 //! }).collect();
 //! let found = find(&windows, &SetupLimits::default());
 //! let position = found.setups[0].position();
@@ -54,4 +54,4 @@ mod tune;
 
 pub use find::{FoundSetups, find};
 pub use owner::{is_own, owner, owners};
-pub use setup::{Cause, Setup, SetupEvidence, SetupLimits, Window};
+pub use setup::{Cause, ScanWindow, Setup, SetupEvidence, SetupLimits};

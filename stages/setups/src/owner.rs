@@ -2,7 +2,7 @@
 //! comb of elevations and in one or two of its columns.
 
 use crate::refine::wrapped;
-use crate::setup::{Setup, Window};
+use crate::setup::{ScanWindow, Setup};
 use geometry::robust::median;
 use geometry::{Point, Vector};
 use std::f64::consts::{PI, TAU};
@@ -56,7 +56,7 @@ pub fn is_own(points: &[[f64; 3]], setup: &Setup) -> bool {
 
 /// The setup of each window.
 #[must_use]
-pub fn owners(windows: &[Window], setups: &[Setup]) -> Vec<Option<usize>> {
+pub fn owners(windows: &[ScanWindow], setups: &[Setup]) -> Vec<Option<usize>> {
     windows.iter().map(|window| owner(middle(&window.points), setups)).collect()
 }
 

@@ -1,6 +1,6 @@
 //! Cuts windows of points into runs that lie in planes: columns of a scanner, or parts of them.
 
-use crate::setup::{SetupLimits, Window};
+use crate::setup::{ScanWindow, SetupLimits};
 use geometry::Vector;
 use geometry::robust::median;
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -30,7 +30,7 @@ struct RunningMoments {
 }
 
 /// Mean, principal directions (least first) and standard deviations along them, metres.
-struct Spread {
+struct RunSpread {
     center: Vector,
     directions: [Vector; 3],
     sd: [f64; 3],
@@ -48,7 +48,7 @@ impl RunningMoments {
         Self { sums }
     }
 
-    fn spread(&self, from: usize, to: usize) -> Spread {
+    fn spread(&self, from: usize, to: usize) -> RunSpread {
         let n = (to - from) as f64;
         let center = (self.sums[to].0 - self.sums[from].0) / n;
         let outer = (self.sums[to].1 - self.sums[from].1) / n - center * center.transpose();
@@ -57,7 +57,7 @@ impl RunningMoments {
         order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
         let directions = order.map(|i| eigen.eigenvectors.column(i).into_owned());
         let sd = order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
-        Spread { center, directions, sd }
+        RunSpread { center, directions, sd }
     }
 }
 
@@ -76,7 +76,11 @@ const FINE: f64 = 0.000_6;
 const INDEPENDENT: f64 = 30.0;
 
 /// The runs of all windows; the points less `origin`.
-pub(crate) fn runs(windows: &[Window], origin: &Vector, settings: &SetupLimits) -> Vec<PlanarRun> {
+pub(crate) fn runs(
+    windows: &[ScanWindow],
+    origin: &Vector,
+    settings: &SetupLimits,
+) -> Vec<PlanarRun> {
     let local: Vec<Vec<Vector>> = windows
         .iter()
         .map(|w| w.points.iter().map(|p| Vector::from(*p) - origin).collect())
@@ -121,7 +125,7 @@ fn limit(windows: &[Vec<Vector>], settings: &SetupLimits) -> f64 {
     (LOOSE * quartile).clamp(FINE, settings.max_plane_rms)
 }
 
-fn is_wide(spread: &Spread) -> bool {
+fn is_wide(spread: &RunSpread) -> bool {
     let [least, middle, most] = spread.sd;
     middle > WIDE.0.max(WIDE.1 * least) && most > LONG
 }
@@ -131,7 +135,7 @@ fn cut(
     points: &[Vector],
     limit: f64,
     settings: &SetupLimits,
-    mut take: impl FnMut(usize, usize, Spread),
+    mut take: impl FnMut(usize, usize, RunSpread),
 ) {
     let least = settings.min_run_points;
     let shift = points.first().copied().unwrap_or_default();

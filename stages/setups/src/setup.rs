@@ -4,7 +4,7 @@ use geometry::{Pose, Vector};
 
 /// Points that follow one another in a file.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Window {
+pub struct ScanWindow {
     /// Place of the first point in its file.
     pub place: u64,
     /// What the file says of whose points these are (`point_source_id`, number of the scan).

@@ -1,6 +1,6 @@
 //! Rooms with furniture, drawn from seeds, measured by scanners with the errors of real ones.
 
-use crate::{Cause, Setup, SetupLimits, Window, find};
+use crate::{Cause, ScanWindow, Setup, SetupLimits, find};
 use geometry::{Pose, Vector};
 use nalgebra::UnitQuaternion;
 use rand::{RngExt, SeedableRng};
@@ -142,10 +142,12 @@ fn scan(room: &Room, at: &Vector, e: Errors, random: &mut Random) -> Vec<[f64; 3
     out
 }
 
-fn windows(points: &[[f64; 3]], n: usize) -> Vec<Window> {
+fn windows(points: &[[f64; 3]], n: usize) -> Vec<ScanWindow> {
     let place = |i: usize| points.len() * i / n;
     let cut = |at: usize| points[at..(at + 512).min(points.len())].to_vec();
-    (0..n).map(|i| Window { place: place(i) as u64, source: 0, points: cut(place(i)) }).collect()
+    (0..n)
+        .map(|i| ScanWindow { place: place(i) as u64, source: 0, points: cut(place(i)) })
+        .collect()
 }
 
 fn error(setup: &Setup, at: &Vector) -> f64 {
@@ -153,7 +155,7 @@ fn error(setup: &Setup, at: &Vector) -> f64 {
 }
 
 /// Scans of a drawn room without ids, with the places of the scanners.
-fn drawn(seed: u64, n: usize, errors: Errors) -> (Vec<Window>, Vec<Vector>) {
+fn drawn(seed: u64, n: usize, errors: Errors) -> (Vec<ScanWindow>, Vec<Vector>) {
     let mut random = Random::new(seed);
     let room = Room::drawn(&mut random);
     let places: Vec<Vector> = (0..n).map(|_| room.place(&mut random)).collect();
@@ -229,7 +231,7 @@ fn without_order_nothing_is_invented() {
 }
 
 /// A profile scanner that is carried along a path: no place is that of a scanner.
-fn carried(seed: u64) -> Vec<Window> {
+fn carried(seed: u64) -> Vec<ScanWindow> {
     let mut random = Random::new(seed);
     let room = Room::drawn(&mut random);
     let size = room.0[0][1];
@@ -273,10 +275,10 @@ fn odd_points_do_no_harm() {
     let odd = [f64::NAN, f64::INFINITY, 0.0, 1e300, -1e-300];
     let mut random = Random::new(9);
     let mut point = || [0, 1, 2].map(|_| odd[(random.between(0.0, 4.99)) as usize]);
-    let windows: Vec<Window> = (0..40)
-        .map(|i| Window { place: i, source: 0, points: (0..200).map(|_| point()).collect() })
+    let windows: Vec<ScanWindow> = (0..40)
+        .map(|i| ScanWindow { place: i, source: 0, points: (0..200).map(|_| point()).collect() })
         .collect();
     assert!(find(&windows, &SetupLimits::default()).setups.is_empty());
-    let same = Window { place: 0, source: 0, points: vec![[1.0, 2.0, 3.0]; 512] };
+    let same = ScanWindow { place: 0, source: 0, points: vec![[1.0, 2.0, 3.0]; 512] };
     assert!(find(&vec![same; 50], &SetupLimits::default()).setups.is_empty());
 }
