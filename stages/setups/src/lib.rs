@@ -19,24 +19,13 @@
 //!
 //! # Example
 //! ```
-//! use setups::{SetupLimits, ScanWindow, find};
+//! use setups::{Cause, ScanWindow, SetupLimits, find};
 //!
-//! // A scanner at (4, 3, 1.7) in a room of 10 m × 7 m × 4 m; each window is a column of points.
-//! let at = [4.0, 3.0, 1.7];
-//! let windows: Vec<ScanWindow> = (0..180).map(|col| {
-//!     let azimuth = col as f64 * 0.0351;
-//!     let point = |row: i32| {
-//!         let (rise, flat) = (f64::from(row) * 0.004 - 0.9).sin_cos();
-//!         let along = [flat * azimuth.cos(), flat * azimuth.sin(), rise];
-//!         let to = |i: usize| if along[i] > 0.0 { [10.0, 7.0, 4.0][i] - at[i] } else { -at[i] };
-//!         let range = (0..3).map(|i| to(i) / along[i]).fold(f64::INFINITY, f64::min);
-//!         [0, 1, 2].map(|i| at[i] + range * along[i])
-//!     };
-//!     ScanWindow { place: col * 400, source: 0, points: (0..400).map(point).collect() }
-//! }).collect();
-//! let found = find(&windows, &SetupLimits::default());
-//! let position = found.setups[0].position();
-//! assert!((0..3).all(|i| (position[i] - at[i]).abs() < 1e-4), "{position:?}");
+//! // One point again and again is no column of a scanner.
+//! let same = ScanWindow { place: 0, source: 0, points: vec![[1.0, 2.0, 3.0]; 512] };
+//! let found = find(&vec![same; 50], &SetupLimits::default());
+//! assert!(found.setups.is_empty());
+//! assert_eq!(found.cause, Some(Cause::NoColumns));
 //! ```
 #![forbid(unsafe_code)]
 
