@@ -5,8 +5,8 @@
 //! Rooms import only rooms to their left:
 //!
 //! ```text
-//! engine  io  job  store  cache  detect  label  result  estimate  rescan  check  arrays  plan
-//! shards  eval  cli
+//! engine  io  job  store  cache  positions  detect  label  result  estimate  rescan  check
+//! arrays  plan  shards  eval  cli
 //! ```
 //!
 //! Only the command line imports `eval`. `tests/house.rs` holds the order, and that no files import
@@ -24,6 +24,7 @@ mod io;
 pub mod job;
 mod label;
 pub mod plan;
+pub mod positions;
 pub mod rescan;
 pub mod result;
 pub mod shards;

@@ -11,19 +11,20 @@ use crate::detect::review::Review;
 use crate::detect::robots::{FittedRobots, KeptRobots, RobotList};
 use crate::detect::search::{PreparedLibrary, Search};
 use crate::detect::{library, tools};
-use crate::engine::{AllThreads, Engine, Task};
+use crate::engine::{Engine, Task};
 use crate::estimate::Estimate;
 use crate::job::{Job, Outcome, Settings, units};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
 use crate::label::near_robots::NearRobots;
+use crate::positions;
 use crate::result::plant_state::{PlantState, Records};
 use crate::result::report::Report;
 use crate::result::{copc, page};
 use crate::store::{Store, spatial_tiles};
 use contract::{Cluster, Fit, Input, Result, Space};
 use export::{COPC, ReviewEntry};
-use ingest::{KnownScanners, Sources};
+use ingest::{Before, KeepLooks, Sources};
 use robot::Library;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -153,16 +154,9 @@ impl<'a> Run<'a> {
         let &Run { job, settings, output, digests, engine, .. } = self;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let review = Review::of(job, &library.models)?;
-        let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
-        let scanners = job.scanners.as_deref().map(read).transpose()?;
         let looks = KeptLooks { digests, settings, folder: output.looks() };
-        let open = || match (self.shards, scanners.as_ref()) {
-            (None, known) => ingest::open(&job.inputs, known, &settings.ingest, &AllThreads),
-            (Some(_), known) => {
-                ingest::open_known(&job.inputs, known, &settings.ingest, &looks, &AllThreads)
-            }
-        };
-        let sources = engine.pool()?.install(open)?;
+        let looks = self.shards.is_some().then_some(&looks as &dyn KeepLooks);
+        let sources = positions::open(job, Before::default(), looks, engine)?.sources;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         let has_tiles = |i: &Input| {

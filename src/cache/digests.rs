@@ -129,7 +129,7 @@ impl Digests {
         settings: &Settings,
     ) -> Option<Key> {
         let own = scans.iter().filter(|s| s.input == input.id);
-        let own = own.map(|s| words(&(s.source_id, s.world_from_scan, s.lattice)));
+        let own = own.map(|s| words(&(s.source_id, &s.places, s.world_from_scan, s.lattice)));
         let own: Vec<String> = own.collect();
         Some(Key::of("tiles", &[self.input(input)?, &own.join("\n"), &words(&settings.ingest)]))
     }
@@ -208,7 +208,8 @@ impl Digests {
         let names: Vec<_> = job.inputs.iter().map(|p| p.display().to_string()).collect();
         let digests: Option<Vec<&String>> = self.inputs.iter().map(OnceLock::get).collect();
         let inputs = words(&(&names, digests?));
-        let settings = words(&(&job.means.settings, job.keep_going, &job.left_out));
+        let settings =
+            words(&(&job.means.settings, job.keep_going, &job.left_out, job.find_scanners));
         Some(Key::of("run", &[&inputs, &self.library, &self.others, &self.base, &settings]))
     }
 }

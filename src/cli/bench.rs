@@ -2,7 +2,7 @@
 
 use super::bench_flags::{
     AccuracyFlags, Against, CheckBenchFlags, KeptFlags, PlanBenchFlags, PlantFlags,
-    RescanBenchFlags, SeedFlags, ThroughputFlags,
+    RescanBenchFlags, ScannersBenchFlags, SeedFlags, ThroughputFlags,
 };
 use super::common::Common;
 use super::exit;
@@ -14,6 +14,7 @@ use crate::eval::bench::plan::{PlanBench, plans};
 use crate::eval::bench::plant::{PlantBench, plants};
 use crate::eval::bench::request::{DrawnCases, PlantSize, RescanBench, RescanSuite};
 use crate::eval::bench::rescan::rescans;
+use crate::eval::bench::scanners::{ScannersBench, scanners};
 use crate::eval::bench::shifts::shifts;
 use crate::eval::bench::throughput::{ThroughputBench, throughput};
 use contract::{Error, Kind, Result};
@@ -98,6 +99,20 @@ pub(super) fn bench_check(flags: &CheckBenchFlags, common: &Common, say: &Say) -
         margin: flags.margin,
     };
     say.result(&checks(&bench, &means, &engine)?);
+    Ok(exit::OK)
+}
+
+pub(super) fn bench_scanners(flags: &ScannersBenchFlags, common: &Common, say: &Say) -> Result<u8> {
+    let means = common.means()?;
+    let engine = common.engine(&means)?;
+    let (seeds, out, keep) = (&flags.seeds, flags.out.clone(), false);
+    let bench = ScannersBench {
+        drawn: DrawnCases { first: seeds.first, seed: seeds.seed, robots: None, out, keep },
+        n_cases: flags.cases,
+        n_setups: [1, usize::from(flags.scans)],
+        n_beams: flags.beams as f64,
+    };
+    say.result(&scanners(&bench, &means, &engine)?);
     Ok(exit::OK)
 }
 

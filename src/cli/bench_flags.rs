@@ -19,6 +19,8 @@ pub(super) enum BenchCommand {
     Rescan(RescanBenchFlags),
     /// Check random paths of robots in random cells: false alarms and misses
     Check(CheckBenchFlags),
+    /// Find the scanners of random halls from clouds that do not state them, in several orders
+    Scanners(ScannersBenchFlags),
     /// Run on random plants of given sizes: points per second, memory, share of the machine's
     /// limits
     Throughput(ThroughputFlags),
@@ -155,6 +157,24 @@ pub(super) struct CheckBenchFlags {
     pub(super) margin: f64,
     #[command(flatten)]
     pub(super) kept: KeptFlags,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ScannersBenchFlags {
+    /// Number of halls
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub(super) cases: usize,
+    #[command(flatten)]
+    pub(super) seeds: SeedFlags,
+    /// Greatest number of scanners of a hall
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub(super) scans: u16,
+    /// Greatest number of beams of a hall
+    #[arg(long, value_name = "N", default_value_t = 8_000_000, value_parser = clap::value_parser!(u64).range(100_000..=200_000_000))]
+    pub(super) beams: u64,
+    /// Output folder of rows and table
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -8,6 +8,9 @@ use clap::Args;
 use contract::Result;
 use std::path::PathBuf;
 
+/// Words that `--scanners` takes in place of a file.
+const AUTO: &str = "auto";
+const NONE: &str = "none";
 /// Variable of the environment that names a configuration file.
 const CONFIG: &str = "STILLPOINT_CONFIG";
 /// Beginning of the names of variables that hold one setting each.
@@ -34,7 +37,8 @@ pub(super) struct Common {
     /// Number of worker threads (default: one per core)
     #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
-    /// File of scanner poses (TOML or JSON), for formats without poses
+    /// File of scanner poses (TOML or JSON), for formats without poses; "auto" finds them from the
+    /// points, "none" leaves them unknown (default: those of the configuration, else auto)
     #[arg(long, global = true, value_name = "FILE")]
     scanners: Option<PathBuf>,
     /// Unit of the inputs' coordinates: m, cm, mm, km, in, ft, us-ft; NAME=UNIT for one file,
@@ -85,7 +89,25 @@ impl Common {
 
     /// The file of scanner poses: that of the flag, else that of the configuration.
     pub(super) fn scanners(&self, means: &Means) -> Option<PathBuf> {
-        self.scanners.clone().or_else(|| means.scanners.clone())
+        match self.word() {
+            Some(_) => None,
+            None => self.scanners.clone().or_else(|| means.scanners.clone()),
+        }
+    }
+
+    /// Whether positions are found from the points where no file is given.
+    pub(super) fn finds_scanners(&self) -> bool {
+        self.word() != Some(NONE)
+    }
+
+    /// Whether the flag asks for positions from the points by name.
+    pub(super) fn asks_for_scanners(&self) -> bool {
+        self.word() == Some(AUTO)
+    }
+
+    /// The word that stands in place of a file.
+    fn word(&self) -> Option<&str> {
+        self.scanners.as_deref()?.to_str().filter(|word| [AUTO, NONE].contains(word))
     }
 
     /// How a terminal or a log shows progress.

@@ -4,6 +4,7 @@
 use super::bench_flags::BenchCommand;
 use super::common::Common;
 use super::program_flags::{CompletionsFlags, ConfigCommand, ManualFlags, SchemaFlags};
+use super::scanners_flags::ScannersFlags;
 use crate::check::PathDoubt;
 use crate::result::conversion::ExportFormat;
 use crate::result::mesh_export::MeshFormat;
@@ -28,6 +29,8 @@ pub(super) enum Command {
     Demo(DemoFlags),
     /// Show what scans contain, and which missing data make results worse
     Inspect(InspectFlags),
+    /// Find from the points where the scanners stood, for clouds that do not state it
+    Scanners(ScannersFlags),
     /// Find the robots in scans, recover their postures and label all points (the main command)
     Run(RunFlags),
     /// Estimate memory, disk space and time of a run without running it

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 /// Commands in the order of the help.
 const GROUPS: [(&str, &[&str]); 7] = [
-    ("Find robots in scans", &["run", "plan", "rescan", "inspect"]),
+    ("Find robots in scans", &["run", "plan", "rescan", "inspect", "scanners"]),
     ("Do a run on many machines", &["shards", "shard", "gather"]),
     ("Look at results", &["report", "verify", "diff", "history"]),
     ("Use results", &["export", "check"]),
@@ -18,8 +18,8 @@ const GROUPS: [(&str, &[&str]); 7] = [
 
 /// Options about coordinates of inputs, and the commands that read inputs of their users.
 const OF_INPUTS: [&str; 2] = ["scanners", "units"];
-const READ_INPUTS: [&str; 8] =
-    ["run", "plan", "rescan", "shards", "shard", "gather", "inspect", "config"];
+const READ_INPUTS: [&str; 9] =
+    ["run", "plan", "rescan", "shards", "shard", "gather", "inspect", "scanners", "config"];
 /// Commands that search for robots, of which the method is chosen.
 const SEARCH: [&str; 9] =
     ["run", "plan", "rescan", "shards", "shard", "gather", "demo", "bench", "config"];
@@ -34,7 +34,9 @@ pub(super) fn command() -> Command {
     let names: Vec<String> = line.get_subcommands().map(|c| c.get_name().to_owned()).collect();
     for name in &names {
         let hidden = OF_INPUTS.iter().filter(|_| !READ_INPUTS.contains(&&**name));
-        let hidden = hidden.chain(["method"].iter().filter(|_| !SEARCH.contains(&&**name)));
+        let of_files = ["scanners"].iter().filter(|_| name == "scanners");
+        let hidden =
+            hidden.chain(of_files).chain(["method"].iter().filter(|_| !SEARCH.contains(&&**name)));
         let hidden = hidden.chain(OF_WORK.iter().filter(|_| SMALL.contains(&&**name)));
         // A command that has an argument already keeps it when common ones are handed down.
         let args: Vec<_> = line.get_arguments().filter(|a| a.is_global_set()).cloned().collect();

@@ -5,20 +5,21 @@ use super::exit;
 use super::flags::{InspectFlags, present};
 use super::say::Say;
 use crate::engine::AllThreads;
+use crate::job::Job;
+use crate::positions;
 use contract::Result;
-use ingest::KnownScanners;
+use ingest::Before;
+use std::path::PathBuf;
 
 pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Result<u8> {
     let means = common.means()?;
     present(&flags.inputs)?;
-    let scanners =
-        common.scanners(&means).map(|path| KnownScanners::read(&path, &means.settings.ingest));
-    let sources = ingest::open(
-        &flags.inputs,
-        scanners.transpose()?.as_ref(),
-        &means.settings.ingest,
-        &AllThreads,
-    )?;
+    let (scanners, nowhere) = (common.scanners(&means), PathBuf::new());
+    let engine = common.engine(&means)?;
+    let job = Job::new(flags.inputs.clone(), nowhere.clone(), nowhere, means);
+    // A look at headers takes no time: only a person who asks for it waits for more.
+    let job = Job { scanners, find_scanners: common.asks_for_scanners(), ..job };
+    let sources = positions::open(&job, Before::default(), None, &engine)?.sources;
     let descriptions = ingest::describe(&sources, &AllThreads);
     if flags.json {
         let all = serde_json::json!({

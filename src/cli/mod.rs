@@ -18,6 +18,8 @@ mod results;
 mod robots;
 mod run;
 mod say;
+mod scanners;
+mod scanners_flags;
 mod schema;
 mod shards;
 mod simulate;
@@ -77,6 +79,7 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
     match &line.command {
         Command::Demo(flags) => demo::demo(flags, &line.common, say),
         Command::Inspect(flags) => inspect::inspect(flags, &line.common, say),
+        Command::Scanners(flags) => scanners::scanners(flags, &line.common, say),
         Command::Run(flags) => run::run(flags, &line.common, say),
         Command::Plan(flags) => run::plan(flags, &line.common, say),
         Command::Rescan(flags) => run::rescan(flags, &line.common, say),
@@ -97,6 +100,9 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
         Command::Bench(BenchCommand::Plan(flags)) => bench::bench_plan(flags, &line.common, say),
         Command::Bench(BenchCommand::Rescan(flags)) => {
             bench::bench_rescan(flags, &line.common, say)
+        }
+        Command::Bench(BenchCommand::Scanners(flags)) => {
+            bench::bench_scanners(flags, &line.common, say)
         }
         Command::Bench(BenchCommand::Throughput(flags)) => {
             bench::bench_throughput(flags, &line.common, say)

@@ -58,6 +58,7 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
         frame: frame(flags.frame.as_deref())?,
         job: Job {
             scanners: common.scanners(&means),
+            find_scanners: common.finds_scanners(),
             ..Job::new(
                 flags.inputs.clone(),
                 flags.robots.clone().unwrap_or_default(),
@@ -136,6 +137,7 @@ pub(super) fn job(flags: &RunFlags, common: &Common) -> Result<(Job, Engine)> {
     let engine = common.engine(&means)?;
     let job = Job {
         scanners: common.scanners(&means),
+        find_scanners: common.finds_scanners(),
         review: flags.review.clone(),
         keep_going: flags.keep_going,
         ..Job::new(flags.inputs.clone(), flags.robots.clone(), flags.out.clone(), means)

@@ -8,12 +8,13 @@ pub(crate) mod shard_costs;
 
 use crate::cache::{Digests, OutputDir};
 use crate::detect::library;
-use crate::engine::{AllThreads, Engine};
+use crate::engine::Engine;
 use crate::job::{Job, Settings, memory_words, units};
+use crate::positions;
 use crate::store::spatial_tiles;
 use contract::words::count;
 use contract::{Error, Input, Kind, Result};
-use ingest::{KnownScanners, Sources};
+use ingest::{Before, Sources};
 use rates::{COPC, INGEST, LOAD, PAGE, REST, SPREAD};
 use serde::Serialize;
 use std::path::Path;
@@ -96,7 +97,7 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
     let has_tiles = |i: &Input, sources: &Sources| {
         earlier.as_ref().is_some_and(|e| e.has_tiles(i, sources, settings))
     };
-    let (mut estimate, sources) = opened(job, has_tiles)?;
+    let (mut estimate, sources) = opened(job, has_tiles, engine)?;
     if unchanged {
         (estimate.store_bytes, estimate.output_bytes, estimate.seconds) = (0, 0, [0.5; 2]);
     } else {
@@ -106,12 +107,13 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
 }
 
 /// Opens all inputs of a job and estimates everything but the search.
-fn opened(job: &Job, has_tiles: impl Fn(&Input, &Sources) -> bool) -> Result<(Estimate, Sources)> {
+fn opened(
+    job: &Job,
+    has_tiles: impl Fn(&Input, &Sources) -> bool,
+    engine: &Engine,
+) -> Result<(Estimate, Sources)> {
     let n_models = library::count(&job.robots)?;
-    let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
-    let scanners = job.scanners.as_deref().map(read).transpose()?;
-    let sources =
-        ingest::open(&job.inputs, scanners.as_ref(), &job.means.settings.ingest, &AllThreads)?;
+    let sources = positions::open(job, Before::default(), None, engine)?.sources;
     units::check_plan(&job.robots, &sources)?;
     Ok((Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)), sources))
 }
@@ -123,7 +125,7 @@ pub(crate) fn with_missing(error: Error, job: &Job, engine: &Engine) -> Error {
     }
     // Where the disk is too full to examine cached pieces, none of them is counted.
     let estimate =
-        estimate(job, engine).or_else(|_| opened(job, |_, _| false).map(|opened| opened.0));
+        estimate(job, engine).or_else(|_| opened(job, |_, _| false, engine).map(|opened| opened.0));
     match estimate.map(|e| e.need().saturating_sub(e.free_bytes)) {
         Ok(missing) if missing > 0 => error.hint(format!(
             "about {} are missing: make room, or choose another --out; what was done is kept, and the next run goes on from it",

@@ -40,6 +40,8 @@ pub struct Job {
     pub robots: PathBuf,
     /// File of scanner poses, for formats without poses.
     pub scanners: Option<PathBuf>,
+    /// Whether scanner positions are found from the points where no file of poses is given.
+    pub find_scanners: bool,
     /// Output folder.
     pub out: PathBuf,
     /// Review file: what a person knows of the robots.
@@ -57,7 +59,8 @@ impl Job {
     #[must_use]
     pub fn new(inputs: Vec<PathBuf>, robots: PathBuf, out: PathBuf, means: Means) -> Self {
         let (scanners, review, keep_going, left_out) = (None, None, false, Vec::new());
-        Self { inputs, robots, scanners, out, review, keep_going, left_out, means }
+        let find_scanners = true;
+        Self { inputs, robots, scanners, find_scanners, out, review, keep_going, left_out, means }
     }
 
     /// Index of the input that an error is about, if the job can go on without it.

@@ -27,8 +27,9 @@ use crate::detect::library;
 use crate::detect::robots::RobotList;
 use crate::detect::search::PreparedLibrary;
 
-use crate::engine::{AllThreads, Engine};
+use crate::engine::Engine;
 use crate::job::{Job, Outcome, units};
+use crate::positions;
 use crate::result::plant_state::PlantState;
 use crate::store::Store;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
@@ -36,7 +37,7 @@ use earlier_points::EarlierPoints;
 use earlier_result::EarlierResult;
 use found::RescanFindings;
 use geometry::{Aabb, Pose};
-use ingest::{KnownScanners, Sources};
+use ingest::Sources;
 use robot::Library;
 use session::{BothScans, CellComparison, ComparedRobots};
 use std::path::PathBuf;
@@ -157,14 +158,7 @@ impl Rescan<'_> {
         let &Rescan { base, job, engine, .. } = self;
         let settings = &job.means.settings;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
-        let read = |path| KnownScanners::read(path, &job.means.settings.ingest);
-        let scanners = job.scanners.as_deref().map(read).transpose()?;
-        let before = base.state.before();
-        let open = || {
-            let settings = &settings.ingest;
-            ingest::open_after(before, &job.inputs, scanners.as_ref(), settings, &AllThreads)
-        };
-        let sources = engine.pool()?.install(open)?;
+        let sources = positions::open(job, base.state.before(), None, engine)?.sources;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         Ok((library, sources))

@@ -23,6 +23,8 @@ pub(crate) fn body() -> Vec<u8> {
         mask,
         name: "one".into(),
         source_id: Some(1),
+        places: Vec::new(),
+        scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::identity(),
         lattice: Some(contract::Lattice::new(0.01, 0.01, 0.0, 0.0)),
         stated_bounds: None,

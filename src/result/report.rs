@@ -12,11 +12,13 @@ use crate::store::Store;
 use contract::words::{Unit, count, fixed, triple};
 use contract::{Fit, Format, Input, JointFit, Mask, Result, Scan, Verdict, quote};
 use export::{
-    InputEntry, LabelFiles, NamedMap, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanLabels,
-    SpaceEntry, StageEntry, write_table,
+    InputEntry, LabelFiles, NamedMap, ResultFile, ReviewEntry, RobotEntry, SCHEMA, ScanEntry,
+    ScanLabels, SpaceEntry, StageEntry, write_table,
 };
+use geometry::Aabb;
 use ingest::{MISPLACED, Sources};
 use robot::{JointKind, Library, Model, Motion, Role};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 /// Everything that `result.json` and the summary are made of.
@@ -45,7 +47,8 @@ impl Report<'_> {
             .enumerate()
             .map(|(i, fit)| {
                 let space = self.written.spaces[i].clone();
-                robot_entry(i, fit, self.robots.models, space)
+                let scanners = self.scanners_near(fit);
+                RobotEntry { scanners, ..robot_entry(i, fit, self.robots.models, space) }
             })
             .collect();
         write_table(output.next(), &robots)?;
@@ -74,6 +77,22 @@ impl Report<'_> {
         result.write(output.next())?;
         let partial = !self.left_out.is_empty() || self.models_left_out().next().is_some();
         Ok(Outcome { summary: self.summary(), warnings, partial, ..Outcome::default() })
+    }
+
+    /// Number of scans with points near a robot by how the positions of their scanners are known.
+    fn scanners_near(&self, fit: &Fit) -> NamedMap<u32> {
+        /// Distance from the links' frames within which points are near, metres.
+        const NEAR: f64 = 0.5;
+        let links = poses(fit, &self.robots.models[fit.model]);
+        let bounds = Aabb::of(links.iter().map(|pose| pose.translation.vector.into())).grown(NEAR);
+        let touching = self.store.touching(&bounds);
+        let scans: BTreeSet<_> =
+            touching.iter().map(|i| self.store.entries()[*i].at.scan).collect();
+        let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
+        for scan in scans {
+            *counts.entry(self.sources.scans[scan.0 as usize].scanner.word()).or_default() += 1;
+        }
+        NamedMap(counts.into_iter().map(|(word, n)| (word.into(), n)).collect())
     }
 
     /// Counts of each stage, without times, so that the same input gives the same bytes.
@@ -274,6 +293,7 @@ pub(crate) fn input_entry(
         n_dropped,
         units: units::entry(sources, input),
         notes: scans.iter().flat_map(|s| &s.notes).cloned().collect(),
+        scans: scans.iter().map(|scan| ScanEntry::from(*scan)).collect(),
     }
 }
 

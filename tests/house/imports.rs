@@ -5,9 +5,24 @@ use super::{code, entries, report, root, rust_files};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Rooms of `src/`, and the plan, from the bottom up: each imports only those before it.
-const ORDER: [&str; 16] = [
-    "engine", "io", "job", "store", "cache", "detect", "label", "result", "estimate", "rescan",
-    "check", "arrays", "plan", "shards", "eval", "cli",
+const ORDER: [&str; 17] = [
+    "engine",
+    "io",
+    "job",
+    "store",
+    "cache",
+    "positions",
+    "detect",
+    "label",
+    "result",
+    "estimate",
+    "rescan",
+    "check",
+    "arrays",
+    "plan",
+    "shards",
+    "eval",
+    "cli",
 ];
 /// Files that may stand beside the rooms; `build.rs` runs before any of them is compiled.
 const BESIDE: [&str; 4] = ["build.rs", "lib.rs", "main.rs", "plan.rs"];

@@ -20,7 +20,9 @@ fn help_and_version_are_no_failures() {
     let help = stillpoint(&["--help"]);
     assert_eq!(code(&help), 0);
     let text = String::from_utf8_lossy(&help.stdout).into_owned();
-    for command in ["demo", "inspect", "run", "plan", "verify", "report", "simulate", "robots"] {
+    for command in
+        ["demo", "inspect", "scanners", "run", "plan", "verify", "report", "simulate", "robots"]
+    {
         assert!(text.contains(command), "{command}");
     }
     assert_eq!(code(&stillpoint(&["--version"])), 0);

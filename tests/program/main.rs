@@ -16,6 +16,7 @@ mod mesh;
 mod moved;
 mod rescan;
 mod review;
+mod scanners;
 mod scans_back;
 mod shards;
 mod tamper;

@@ -87,10 +87,11 @@ fn compare(name: &str, text: &str) {
 }
 
 /// Words of the command line that lead to a command of their own.
-const COMMANDS: [&str; 25] = [
+const COMMANDS: [&str; 27] = [
     "",
     "demo",
     "inspect",
+    "scanners",
     "run",
     "plan",
     "rescan",
@@ -108,6 +109,7 @@ const COMMANDS: [&str; 25] = [
     "bench throughput",
     "bench check",
     "bench plan",
+    "bench scanners",
     "robots",
     "robots lint",
     "robots calibrate",

@@ -86,6 +86,8 @@ impl ScannedCell {
                 mask: MaskId(k as u32),
                 name: frame.name.clone(),
                 source_id: None,
+                places: Vec::new(),
+                scanner: contract::ScannerPosition::Stated,
                 world_from_scan: frame.world_from_scan,
                 lattice: Some(Lattice::new(step, step, row, col)),
                 stated_bounds: None,

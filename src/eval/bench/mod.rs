@@ -21,6 +21,7 @@ mod plot;
 mod process_watch;
 pub mod request;
 pub mod rescan;
+pub mod scanners;
 mod score;
 mod shape;
 mod sheet;

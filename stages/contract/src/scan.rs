@@ -58,6 +58,45 @@ pub struct Mask {
     pub n_points: Option<u64>,
 }
 
+/// How the position of a scanner is known.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub enum ScannerPosition {
+    /// The file states it.
+    Stated,
+    /// A person gave it.
+    Given,
+    /// It was found from the points.
+    Found {
+        /// Standard deviation along each axis of the world, metres.
+        sigma: [f64; 3],
+    },
+    /// It is not known.
+    #[default]
+    Unknown,
+}
+
+impl ScannerPosition {
+    /// `stated`, `given`, `found` or `unknown`.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Stated => "stated",
+            Self::Given => "given",
+            Self::Found { .. } => "found",
+            Self::Unknown => "unknown",
+        }
+    }
+
+    /// Standard deviation of a found position along each axis of the world, metres.
+    #[must_use]
+    pub fn sigma(self) -> Option<[f64; 3]> {
+        match self {
+            Self::Found { sigma } => Some(sigma),
+            _ => None,
+        }
+    }
+}
+
 /// All points measured from one scanner position.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Scan {
@@ -71,6 +110,11 @@ pub struct Scan {
     pub name: String,
     /// The `point_source_id` of its points, where it tells the scans of a LAS file apart.
     pub source_id: Option<u16>,
+    /// First and last places of the stretches of its points in its mask, ascending, where these
+    /// tell the scans of a file apart; else empty.
+    pub places: Vec<[u64; 2]>,
+    /// How the position of its scanner is known.
+    pub scanner: ScannerPosition,
     /// Pose of the scanner in the world, metres. Where the scanner's position is unknown this is a
     /// translation near the points, so that coordinates in the scan frame stay small.
     pub world_from_scan: Pose,

@@ -54,6 +54,7 @@ mod result_file;
 mod review;
 mod robot_model;
 mod robot_picture;
+mod scan_entry;
 mod session;
 mod settings;
 mod space;
@@ -92,6 +93,7 @@ pub use result::{
 pub use review::ReviewEntry;
 pub use robot_model::{mesh_files, write_robot};
 pub use robot_picture::RobotPicture;
+pub use scan_entry::ScanEntry;
 pub use session::{CarriedEntry, RegistrationEntry, RescanEntry};
 pub use settings::Settings;
 pub use space::{SpaceEntry, write_space};

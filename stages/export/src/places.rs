@@ -9,6 +9,14 @@ use std::marker::PhantomData;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedMap<T>(pub Vec<(String, T)>);
 
+impl<T> NamedMap<T> {
+    /// Whether it has no names.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
 impl<T> Default for NamedMap<T> {
     fn default() -> Self {
         Self(Vec::new())

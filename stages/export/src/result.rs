@@ -6,6 +6,7 @@ use crate::finite::finite;
 use crate::mask::MaskFiles;
 use crate::places::NamedMap;
 use crate::review::ReviewEntry;
+use crate::scan_entry::ScanEntry;
 use crate::session::RescanEntry;
 use crate::space::SpaceEntry;
 use contract::{Certainty, Fit, JointFit, Mask};
@@ -117,6 +118,10 @@ pub struct RobotEntry {
     /// Errors of the scans' stated poses near the robot.
     #[serde(default)]
     pub scans: Vec<ShiftEntry>,
+    /// Number of scans near the robot by how the positions of their scanners are known: `stated`,
+    /// `given`, `found` or `unknown`.
+    #[serde(default, skip_serializing_if = "NamedMap::is_empty")]
+    pub scanners: NamedMap<u32>,
     /// Numbers of the scans in which the robot has this posture, if it moved between scans; empty
     /// means all scans.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -288,6 +293,9 @@ pub struct InputEntry {
     pub units: Option<UnitsEntry>,
     /// Messages about what the file lacks and which results suffer from it.
     pub notes: Vec<String>,
+    /// The scans of the file, and how the positions of their scanners are known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scans: Vec<ScanEntry>,
 }
 
 /// Units of an input's coordinates.
@@ -358,6 +366,7 @@ impl RobotEntry {
             surface_sigma: finite(fit.surface_sigma),
             tip_sigma: finite(fit.tip_sigma),
             scans: fit.scans.iter().map(ShiftEntry::from).collect(),
+            scanners: NamedMap::default(),
             stands_in: fit.stands_in.iter().map(|s| s.0).collect(),
             space: None,
             slides: Vec::new(),

@@ -148,6 +148,7 @@ fn sample(out: &Path) {
             n_dropped: 5,
             units: None,
             notes: Vec::new(),
+            scans: Vec::new(),
         }],
         stages: vec![StageEntry {
             name: "segment".into(),

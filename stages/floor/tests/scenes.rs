@@ -14,6 +14,8 @@ fn scan(id: u32, position: Option<[f64; 3]>) -> Scan {
         mask: MaskId(0),
         name: format!("scan {id}"),
         source_id: None,
+        places: Vec::new(),
+        scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::new(Vector::from(position.unwrap_or_default()), Vector::zeros()),
         lattice: position.map(|_| Lattice::new(0.002, 0.002, 0.0, 0.0)),
         stated_bounds: None,

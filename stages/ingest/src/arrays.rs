@@ -10,7 +10,7 @@ use crate::settings::Settings;
 use crate::sources::Sources;
 use crate::units::Units;
 use crate::{sampling, steps};
-use contract::{Attributes, Error, Fan, Format, Kind, Result};
+use contract::{Attributes, Error, Fan, Format, Kind, Result, ScannerPosition};
 use geometry::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -139,6 +139,11 @@ impl ArrayReader {
             name: name.clone(),
             mask: 0,
             source_id: None,
+            places: Vec::new(),
+            position: match scanner_known {
+                true => ScannerPosition::Given,
+                false => ScannerPosition::Unknown,
+            },
             world_from_scan,
             scanner_known,
             stated_bounds: None,

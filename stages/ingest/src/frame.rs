@@ -1,7 +1,7 @@
 //! Chooses the scan frame, from the stated pose and a few points, so that coordinates in it stay
 //! small and its origin is the scanner where that is possible.
 
-use contract::{Error, Result};
+use contract::{Error, Result, ScannerPosition};
 use geometry::{Aabb, Point, Pose};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
@@ -34,6 +34,11 @@ pub(crate) struct FileFrame {
 }
 
 impl FileFrame {
+    /// How the scanner's position is known.
+    pub(crate) fn position(&self) -> ScannerPosition {
+        if self.scanner_known { ScannerPosition::Stated } else { ScannerPosition::Unknown }
+    }
+
     /// The file's own frame, with the scanner at its origin.
     pub(crate) fn of_scanner(world_from_scan: Pose) -> Self {
         let no_return = ([0.0; 3], NO_RETURN);

@@ -9,7 +9,8 @@ use crate::laz::LazStream;
 use crate::map::Mapped;
 use crate::oddities::Oddities;
 use crate::reader::{
-    Extent, FileReading, MaskSeed, RawStrip, Reader, SampledPoint, ScanSeed, Want,
+    Extent, FileReading, MaskSeed, PointWindow, RawStrip, Reader, SampledPoint, ScanSeed, Want,
+    WindowSample,
 };
 use crate::sampling;
 use crate::settings::Settings;
@@ -38,8 +39,7 @@ impl Las {
         let found = las_scans::find(path, &records, scanners, settings)?;
         let pose = |s: &ScanSeed| (s.world_from_scan, s.scanner_known);
         let poses: Vec<_> = found.scans.iter().map(pose).collect();
-        let decoder =
-            Decoder::new(&records.header, &poses, found.scan_of_source, settings.max_range);
+        let decoder = Decoder::new(&records.header, &poses, found.scan_of, settings.max_range);
         let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
         let n_points = Some(records.header.n_points);
         Ok(Self {
@@ -94,6 +94,34 @@ impl Reader for Las {
     fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>> {
         sampling::spread(self.extents[scan], n, most, |from, length| {
             self.points_of(scan, from, length)
+        })
+    }
+
+    fn window_starts(&self, scan: usize, sample: WindowSample) -> Option<Vec<u64>> {
+        let is_stream = self.records.laz.as_ref().is_some_and(|laz| laz.pieces.is_empty());
+        if is_stream {
+            return None;
+        }
+        let (first, last) = self.extents[scan];
+        let n = (last + 1).saturating_sub(first);
+        let n_windows = sample.n_windows.min(n / sample.n_points.max(1)).max(u64::from(n > 0));
+        let start = |i: u64| first + (n as f64 * i as f64 / n_windows as f64) as u64;
+        let mut starts: Vec<u64> = (0..n_windows).map(start).collect();
+        starts.dedup_by_key(|start| self.records.start(*start));
+        Some(starts)
+    }
+
+    fn window(&self, first: u64, n: usize) -> Result<PointWindow> {
+        let (place, records) = self.records.run(first, n)?;
+        let layout = self.decoder.layout();
+        let len = self.records.header.record_len;
+        let own = |record: &&[u8]| !layout.withheld(record);
+        let world = |record: &[u8]| self.decoder.world(record);
+        let points = records.chunks_exact(len).filter(own).map(world);
+        Ok(PointWindow {
+            place,
+            source_id: records.chunks_exact(len).next().map_or(0, |r| layout.source_id(r)),
+            points: points.filter(|p| p.iter().all(|v| v.is_finite())).collect(),
         })
     }
 

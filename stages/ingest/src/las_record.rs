@@ -6,6 +6,7 @@ use crate::las_header::LasHeader;
 use crate::las_layout::{LAYOUTS, RecordLayout, u16_at};
 use crate::oddities::Oddities;
 use crate::reader::{RawStrip, Want};
+use crate::scan_of_point::ScanOfPoint;
 use contract::Attributes;
 use geometry::Pose;
 
@@ -77,8 +78,8 @@ pub(crate) struct Decoder {
     scale: [f64; 3],
     offset: [f64; 3],
     frames: Vec<CountFrame>,
-    /// Index of the scan of each source id; empty where all points belong to scan 0.
-    scan_of_source: Vec<u16>,
+    /// Which points belong to which scan.
+    scan_of: ScanOfPoint,
     max_range: f64,
     /// Counts of odd points, one entry a scan.
     oddities: Vec<Oddities>,
@@ -91,12 +92,10 @@ impl Decoder {
     }
 
     /// A decoder for scans with these poses; each says whether its origin is the scanner.
-    /// `scan_of_source` gives the scan of each source id (65,536 entries), or is empty where there
-    /// is only one scan.
     pub(crate) fn new(
         header: &LasHeader,
         poses: &[(Pose, bool)],
-        scan_of_source: Vec<u16>,
+        scan_of: ScanOfPoint,
         max_range: f64,
     ) -> Self {
         let frames: Vec<CountFrame> = poses
@@ -121,7 +120,7 @@ impl Decoder {
             offset: header.offset,
             oddities: frames.iter().map(|_| Oddities::default()).collect(),
             frames,
-            scan_of_source,
+            scan_of,
             max_range,
         }
     }
@@ -142,21 +141,16 @@ impl Decoder {
     /// place. `first` is the place of the first record.
     pub(crate) fn decode(&self, records: &[u8], first: u64, want: Want) -> Vec<RawStrip> {
         let n = records.len() / self.record_len;
-        if self.scan_of_source.is_empty() {
+        if matches!(self.scan_of, ScanOfPoint::One) {
             let mut strip = self.empty(0, first, n, want);
             self.add(&mut strip, records, first);
             return trimmed(strip).into_iter().collect();
         }
         let mut strips: Vec<Option<RawStrip>> = vec![None; self.frames.len()];
-        let scan = |i: usize| {
-            let record = &records[i * self.record_len..];
-            usize::from(self.scan_of_source[usize::from(self.layout.source_id(record))])
-        };
         // Points of one scan usually follow one another.
         let mut from = 0;
         while from < n {
-            let own = scan(from);
-            let to = (from + 1..n).find(|&i| scan(i) != own).unwrap_or(n);
+            let (own, to) = self.stretch(records, first, from, n);
             let strip = strips[own].get_or_insert_with(|| {
                 self.empty(own, first + from as u64, if from == 0 { n } else { 0 }, want)
             });
@@ -167,6 +161,26 @@ impl Decoder {
         let mut strips: Vec<_> = strips.into_iter().flatten().filter_map(trimmed).collect();
         strips.sort_by_key(|s| s.first_place);
         strips
+    }
+
+    /// The scan of a record, and the number of the first record behind it of another scan.
+    fn stretch(&self, records: &[u8], first: u64, from: usize, n: usize) -> (usize, usize) {
+        match &self.scan_of {
+            ScanOfPoint::One => (0, n),
+            ScanOfPoint::BySource(scans) => {
+                let scan = |i: usize| {
+                    scans[usize::from(self.layout.source_id(&records[i * self.record_len..]))]
+                };
+                let own = scan(from);
+                let to = (from + 1..n).find(|&i| scan(i) != own).unwrap_or(n);
+                (usize::from(own), to)
+            }
+            ScanOfPoint::ByPlace(places) => {
+                let (scan, last) = places.of(first + from as u64);
+                let left = last.saturating_sub(first).saturating_add(1).min(n as u64);
+                (usize::from(scan), left as usize)
+            }
+        }
     }
 
     /// Adds records of one scan to its strip; `first` is the place of the first record.

@@ -6,8 +6,9 @@ use crate::las_layout::RecordLayout;
 use crate::las_runs::LasRecords;
 use crate::place_look::PlaceLook;
 use crate::reader::ScanSeed;
+use crate::scan_of_point::{PlacesOfScans, ScanOfPoint};
 use crate::settings::Settings;
-use contract::Result;
+use contract::{Result, ScannerPosition};
 use geometry::{Aabb, Pose};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,6 +22,10 @@ pub(crate) struct LasScanner {
     pub(crate) name: Option<String>,
     /// Pose `world_from_scan`, metres.
     pub(crate) pose: Pose,
+    /// How it is known.
+    pub(crate) position: ScannerPosition,
+    /// First and last places of the stretches of its points; empty where its source id tells.
+    pub(crate) places: Vec<[u64; 2]>,
     /// Whether it may belong to another file, so that it is left out if no point of it is seen
     /// here.
     pub(crate) may_be_elsewhere: bool,
@@ -29,8 +34,8 @@ pub(crate) struct LasScanner {
 /// The scans of one file.
 pub(crate) struct FoundScans {
     pub(crate) scans: Vec<ScanSeed>,
-    /// Index of the scan of each source id; empty where there is only one scan.
-    pub(crate) scan_of_source: Vec<u16>,
+    /// Which points belong to which scan.
+    pub(crate) scan_of: ScanOfPoint,
     /// First and last place at which points of each scan were seen.
     pub(crate) extents: Vec<(u64, u64)>,
     /// Whether all sampled points lie inside the stated bounds.
@@ -90,6 +95,8 @@ pub(crate) fn find(
         world_from_scan: pose
             .unwrap_or_else(|| Pose::translation(look.origin[0], look.origin[1], look.origin[2])),
         scanner_known: pose.is_some(),
+        position: ScannerPosition::Unknown,
+        places: Vec::new(),
         stated_bounds: header.bounds.filter(|_| !look.bounds_wrong()),
         stated_points: None,
         likely_points: None,
@@ -98,12 +105,15 @@ pub(crate) fn find(
     };
     let mut found = FoundScans {
         scans: Vec::new(),
-        scan_of_source: Vec::new(),
+        scan_of: ScanOfPoint::One,
         extents: Vec::new(),
         bounds_hold: look.outside == 0 && header.bounds.is_some(),
     };
-    if let Some(only) = scanners.iter().find(|s| s.source_id.is_none()) {
+    if scanners.iter().any(|s| !s.places.is_empty()) {
+        by_place(&mut found, scanners, header, &stem, seed);
+    } else if let Some(only) = scanners.iter().find(|s| s.source_id.is_none()) {
         let mut scan = seed(only.name.clone().unwrap_or(stem), None, Some(only.pose));
+        scan.position = only.position;
         scan.stated_points = Some(header.n_points);
         found.scans.push(scan);
         found.extents.push(whole);
@@ -148,8 +158,11 @@ fn by_source_id(
             continue;
         }
         scan_of_source[usize::from(id)] = found.scans.len() as u16;
-        let name = scanner.name.clone().unwrap_or_else(|| format!("{stem} {id}"));
+        // The name of the file says of which file the points are, not which scan they are.
+        let own_name = scanner.name.clone().filter(|name| name != stem);
+        let name = own_name.unwrap_or_else(|| format!("{stem} {id}"));
         let mut scan = seed(name, Some(id), Some(scanner.pose));
+        scan.position = scanner.position;
         scan.likely_points = seen.map(|seen| census.likely(seen.2, n_records));
         found.scans.push(scan);
         // Windows may miss the first and last points of a scan; the places between those seen are
@@ -163,7 +176,42 @@ fn by_source_id(
         found.scans.push(seed(format!("{stem} (rest)"), None, None));
         found.extents.push(whole);
     }
-    found.scan_of_source = scan_of_source;
+    found.scan_of = ScanOfPoint::BySource(scan_of_source);
+}
+
+/// Makes a scan for each scanner with places in this file, and one for all other points.
+fn by_place(
+    found: &mut FoundScans,
+    scanners: &[LasScanner],
+    header: &LasHeader,
+    stem: &str,
+    seed: impl Fn(String, Option<u16>, Option<Pose>) -> ScanSeed,
+) {
+    let whole = whole_extent(header);
+    let mut stretches = Vec::new();
+    for scanner in scanners.iter().filter(|s| !s.places.is_empty()) {
+        let within = |[first, last]: &[u64; 2]| (*first, (*last).min(whole.1));
+        let own: Vec<(u64, u64)> =
+            scanner.places.iter().map(within).filter(|(first, last)| first <= last).collect();
+        let (Some(first), Some(last)) = (own.first(), own.last()) else { continue };
+        let number = found.scans.len() as u16;
+        let name = scanner.name.clone().filter(|name| name != stem);
+        let name = name.unwrap_or_else(|| format!("{stem} {}", number + 1));
+        let mut scan = seed(name, None, Some(scanner.pose));
+        scan.position = scanner.position;
+        scan.places = own.iter().map(|(first, last)| [*first, *last]).collect();
+        scan.likely_points = Some(own.iter().map(|(first, last)| last - first + 1).sum());
+        found.scans.push(scan);
+        found.extents.push((first.0, last.1));
+        stretches.extend(own.into_iter().map(|(first, last)| (first, last, number)));
+    }
+    let rest = found.scans.len() as u16;
+    let by_place = PlacesOfScans::new(stretches, rest);
+    if !by_place.are_all(whole) {
+        found.scans.push(seed(format!("{stem} (rest)"), None, None));
+        found.extents.push(whole);
+    }
+    found.scan_of = ScanOfPoint::ByPlace(by_place);
 }
 
 /// The stated bounds with a margin, since writers round them by up to a tenth of a unit.

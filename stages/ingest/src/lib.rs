@@ -56,6 +56,7 @@ mod raster_native;
 mod reader;
 mod regular;
 mod sampling;
+mod scan_of_point;
 mod scanners;
 mod settings;
 mod size;
@@ -63,6 +64,7 @@ mod sources;
 mod steps;
 mod text;
 mod units;
+mod windows;
 
 pub use arrays::{ArrayScan, open_arrays};
 pub use glance::{Glance, GlanceSample};
@@ -72,7 +74,7 @@ pub use inspect::{
 pub use looked::{InputLooks, KeepLooks};
 pub use map::{Mapped, map};
 pub use position::MISPLACED;
-pub use reader::{Extent, Want};
+pub use reader::{Extent, PointWindow, Want, WindowSample};
 pub use regular::{read_text, regular};
 pub use scanners::{KnownScanner, KnownScanners};
 pub use settings::Settings;

@@ -5,7 +5,7 @@ use crate::frame::NO_RETURN;
 use crate::oddities::no_returns_note;
 use crate::reader::ScanSeed;
 use crate::settings::Settings;
-use contract::{Error, Kind, Result};
+use contract::{Error, Kind, Result, ScannerPosition};
 use geometry::Aabb;
 use nalgebra::Vector3;
 
@@ -28,6 +28,12 @@ pub(crate) struct PlaceLook {
     middle: Option<[f64; 3]>,
     /// Origin to use where no scanner is known: whole metres near the median.
     pub(crate) origin: [f64; 3],
+}
+
+/// Message for scans whose scanner's position was found from their points.
+pub(crate) fn found_note(sigma: [f64; 3]) -> String {
+    let most = sigma.iter().fold(0.0_f64, |most, s| s.max(most)) * 1e3;
+    format!("the scanner's position was found from the points, to about {most:.2} mm")
 }
 
 impl PlaceLook {
@@ -65,6 +71,9 @@ impl PlaceLook {
     /// points, and notes what users should know.
     pub(crate) fn check(&self, scan: &mut ScanSeed, settings: &Settings) -> Result<()> {
         if scan.scanner_known {
+            if let ScannerPosition::Found { sigma } = scan.position {
+                scan.notes.push(found_note(sigma));
+            }
             let n = self.n_at(scan.world_from_scan.translation.vector);
             if n > 0 {
                 scan.notes.push(no_returns_note(n, self.points.len()));

@@ -3,7 +3,6 @@
 
 use crate::las_scans::LasScanner;
 use crate::scanners::{KnownScanner, KnownScanners};
-use geometry::Pose;
 use std::path::{Path, PathBuf};
 
 /// The scanners that the user gave, and which of them were used.
@@ -26,10 +25,10 @@ impl<'a> Poses<'a> {
         }
     }
 
-    pub(crate) fn by_scan_name(&mut self, name: &str) -> Option<Pose> {
+    pub(crate) fn by_scan_name(&mut self, name: &str) -> Option<&'a KnownScanner> {
         let at = self.entries.iter().position(|e| e.name.as_deref() == Some(name))?;
         self.used[at] = true;
-        Some(self.entries[at].world_from_scan)
+        Some(&self.entries[at])
     }
 
     /// The scanners of a LAS or LAZ file: entries with its name; else those with a source id whose
@@ -43,12 +42,16 @@ impl<'a> Poses<'a> {
         let only = |e: &KnownScanner| {
             self.entries.len() == 1 && e.point_source_id.is_none() && !for_another(e)
         };
-        let whole = |e: &KnownScanner| named(e) && e.point_source_id.is_none();
+        let by_place = |e: &KnownScanner| {
+            !e.places.is_empty() && (named(e) || (!self.several && !for_another(e)))
+        };
+        let is_whole = |e: &KnownScanner| e.point_source_id.is_none() && e.places.is_empty();
+        let whole = |e: &KnownScanner| named(e) && is_whole(e);
         let chosen: Vec<usize> = match self.entries.iter().position(whole) {
             Some(at) => vec![at],
             None => {
                 let fits = |e: &KnownScanner| {
-                    (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e)
+                    (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e) || by_place(e)
                 };
                 (0..self.entries.len()).filter(|i| fits(&self.entries[*i])).collect()
             }
@@ -58,11 +61,18 @@ impl<'a> Poses<'a> {
             let entry = &self.entries[at];
             self.used[at] = true;
             // An entry with this file's name takes precedence over one that only shares the id.
-            let twin = scanners.iter().position(|s| s.source_id == entry.point_source_id);
+            let is_twin = |s: &LasScanner| {
+                s.source_id == entry.point_source_id
+                    && s.places.is_empty()
+                    && entry.places.is_empty()
+            };
+            let twin = scanners.iter().position(is_twin);
             let scanner = LasScanner {
                 source_id: entry.point_source_id,
                 name: entry.name.clone(),
                 pose: entry.world_from_scan,
+                position: entry.position(),
+                places: entry.places.clone(),
                 may_be_elsewhere: self.several && !named(entry),
             };
             match twin {

@@ -38,6 +38,8 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
             source_id: None,
             world_from_scan: block.frame.world_from_scan,
             scanner_known: block.frame.scanner_known,
+            places: Vec::new(),
+            position: block.frame.position(),
             stated_bounds: None,
             stated_points: Some(block.n_valid),
             likely_points: None,

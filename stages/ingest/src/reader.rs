@@ -4,7 +4,7 @@
 use crate::map::Mapped;
 use crate::oddities::Oddities;
 use crate::units::{ReferenceSystem, Units};
-use contract::{Attributes, Error, Format, Kind, Result};
+use contract::{Attributes, Error, Format, Kind, Result, ScannerPosition};
 use geometry::{Aabb, Pose};
 use std::ops::Range;
 
@@ -37,6 +37,11 @@ pub(crate) struct ScanSeed {
     pub(crate) mask: usize,
     /// Point source id of LAS, where scans are told apart by it.
     pub(crate) source_id: Option<u16>,
+    /// First and last places of the stretches of its points, where these tell scans apart.
+    pub(crate) places: Vec<[u64; 2]>,
+    /// How the scanner's position is known: `Stated` or `Unknown`, or what a scanners file says of
+    /// a LAS file.
+    pub(crate) position: ScannerPosition,
     /// Pose of the scan frame, metres; a translation near the points where the scanner is unknown.
     pub(crate) world_from_scan: Pose,
     /// Whether the origin of the scan frame is the scanner.
@@ -129,6 +134,26 @@ impl Extent {
     }
 }
 
+/// Points that follow one another in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointWindow {
+    /// Place of the first point in its mask.
+    pub place: u64,
+    /// Its `point_source_id`, in LAS and LAZ files; else 0.
+    pub source_id: u16,
+    /// The points, world, metres.
+    pub points: Vec<[f64; 3]>,
+}
+
+/// How many windows are read, and how long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WindowSample {
+    /// Largest number of windows.
+    pub n_windows: u64,
+    /// Number of points of each.
+    pub n_points: u64,
+}
+
 /// How a file is read, in file order.
 pub(crate) enum FileReading<'a> {
     /// From its beginning to its end.
@@ -150,6 +175,16 @@ pub(crate) trait Reader: Send + Sync {
     /// Up to `n` valid points of a scan (scan frame, metres), evenly spread over it, or over its
     /// first `most` points if it has more.
     fn spread(&self, scan: usize, n: usize, most: u64) -> Result<Vec<[f32; 3]>>;
+    /// First places of windows of a scan, spread over it; `None` for a format that is read from
+    /// beginning to end.
+    fn window_starts(&self, _scan: usize, _sample: WindowSample) -> Option<Vec<u64>> {
+        None
+    }
+    /// Points that follow one another, from a place on or from the piece that holds it.
+    fn window(&self, first: u64, _n: usize) -> Result<PointWindow> {
+        let what = format!("the window at \"{first}\" was asked of a format without windows");
+        Err(Error::new(Kind::Bug, what))
+    }
     /// All valid points in file order. A broken file gives an error and never a silent end.
     fn read(&self, want: Want) -> Result<FileReading<'_>>;
     /// The points of an extent, from its bytes.

@@ -2,7 +2,7 @@
 
 use crate::regular::read_text;
 use crate::settings::Settings;
-use contract::{Error, Kind, Result};
+use contract::{Error, Kind, Result, ScannerPosition};
 use geometry::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
@@ -21,6 +21,20 @@ pub struct KnownScanner {
     pub name: Option<String>,
     /// Pose of the scanner in the world, metres.
     pub world_from_scan: Pose,
+    /// Standard deviation of a position that was found from the points, along each axis of the
+    /// world, metres.
+    pub sigma: Option<[f64; 3]>,
+    /// First and last places of the stretches of its points in a LAS file, ascending, where no
+    /// source id tells them apart; else empty.
+    pub places: Vec<[u64; 2]>,
+}
+
+impl KnownScanner {
+    /// How the position is known.
+    #[must_use]
+    pub fn position(&self) -> ScannerPosition {
+        self.sigma.map_or(ScannerPosition::Given, |sigma| ScannerPosition::Found { sigma })
+    }
 }
 
 /// Scanner poses from the user, for formats that carry none.
@@ -50,6 +64,13 @@ struct ScannerText {
     position: [f64; 3],
     /// Rotation `world_from_scan`, unit quaternion; no rotation without it.
     quaternion_wxyz: Option<[f64; 4]>,
+    /// Standard deviation of a position that was found from the points, along x, y, z, metres;
+    /// without it the position counts as given.
+    sigma: Option<[f64; 3]>,
+    /// Places of the scanner's points in a LAS or LAZ file, where no `point_source_id` tells them
+    /// apart: first and last of each stretch, counted from 0, ascending.
+    #[serde(default)]
+    places: Vec<[u64; 2]>,
 }
 
 impl KnownScanners {
@@ -68,8 +89,7 @@ impl KnownScanners {
     /// # Errors
     /// As [`KnownScanners::read`].
     pub fn parse(text: &str) -> Result<Self> {
-        const HINT: &str =
-            "an entry has position, and may have name, point_source_id and quaternion_wxyz";
+        const HINT: &str = "an entry has position, and may have name, point_source_id, quaternion_wxyz, sigma and places";
         let file: ScannersFile = if text.trim_start().starts_with('{') {
             serde_json::from_str(text)
                 .map_err(|e| Error::bad_input("wrong JSON").because(e).hint(HINT))?
@@ -87,7 +107,8 @@ impl KnownScanners {
         let mut known = BTreeMap::new();
         for (i, entry) in file.scanner.into_iter().enumerate() {
             let entry = entry.check().map_err(|e| e.at(format!("scanner {}", i + 1)))?;
-            let twin = known.insert((entry.point_source_id, entry.name.clone()), i);
+            let key = (entry.point_source_id, entry.name.clone(), entry.places.first().copied());
+            let twin = known.insert(key, i);
             if let Some(twin) = twin {
                 return Err(Error::new(
                     Kind::BadInput,
@@ -98,6 +119,30 @@ impl KnownScanners {
             entries.push(entry);
         }
         Ok(Self { entries })
+    }
+}
+
+impl KnownScanner {
+    /// The entry of a file in TOML, with remarks for people before it.
+    #[must_use]
+    pub fn to_toml(&self, remarks: &[String]) -> String {
+        let mut text: String = remarks.iter().map(|remark| format!("# {remark}\n")).collect();
+        text.push_str("[[scanner]]\n");
+        let mut add = |key: &str, value: Option<String>| {
+            text.extend(value.map(|value| format!("{key} = {value}\n")));
+        };
+        add("point_source_id", self.point_source_id.map(|id| id.to_string()));
+        add("name", self.name.clone().map(|name| toml::Value::String(name).to_string()));
+        let (at, q) = (self.world_from_scan.translation, self.world_from_scan.rotation);
+        add("position", Some(format!("{:?}", [at.x, at.y, at.z])));
+        add("quaternion_wxyz", Some(format!("{:?}", [q.w, q.i, q.j, q.k])));
+        add("sigma", self.sigma.map(|sigma| format!("{sigma:?}")));
+        let pairs: Vec<String> = self.places.iter().map(|pair| format!("{pair:?}")).collect();
+        // Lines of a length that people can look at.
+        let lines: Vec<String> = pairs.chunks(6).map(|line| line.join(", ")).collect();
+        let is_by_place = !self.places.is_empty();
+        add("places", is_by_place.then(|| format!("[\n  {},\n]", lines.join(",\n  "))));
+        text
     }
 }
 
@@ -119,11 +164,23 @@ impl ScannerText {
                 UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
             }
         };
+        if let Some(bad) = self.sigma.iter().flatten().find(|v| !(v.is_finite() && **v >= 0.0)) {
+            return Err(Error::bad_input(format!("sigma must be positive, not \"{bad}\"")));
+        }
+        let ends = || self.places.windows(2).map(|w| (w[0][1], w[1][0]));
+        let is_in_order = ends().all(|(last, next)| last < next);
+        if !is_in_order || self.places.iter().any(|[first, last]| first > last) {
+            return Err(Error::bad_input(
+                "places must be pairs of first and last place, each after the one before",
+            ));
+        }
         let [x, y, z] = self.position;
         Ok(KnownScanner {
             point_source_id: self.point_source_id,
             name: self.name,
             world_from_scan: Pose::from_parts(Translation3::new(x, y, z), turn),
+            sigma: self.sigma,
+            places: self.places,
         })
     }
 }
@@ -155,6 +212,19 @@ mod tests {
     }
 
     #[test]
+    fn what_is_written_reads_back() {
+        let text = "[[scanner]]\nname = 'a\"b'\nposition = [4.9, 1e-7, 5000000.25]\n\
+                    quaternion_wxyz = [0.6, 0, 0, 0.8]\nsigma = [1e-4, 2e-4, 3e-5]\n\
+                    places = [[0, 7], [9, 9], [11, 12345678901]]\n\
+                    [[scanner]]\npoint_source_id = 7\nposition = [0, 0, 0.5]\n";
+        let read = KnownScanners::parse(text).unwrap();
+        let remarks = ["found from 3 planes".to_string()];
+        let again: String = read.entries.iter().map(|e| e.to_toml(&remarks) + "\n").collect();
+        assert_eq!(KnownScanners::parse(&again).unwrap(), read);
+        assert!(again.starts_with("# found from 3 planes\n[[scanner]]\n"));
+    }
+
+    #[test]
     fn wrong_entries_are_named() {
         for (text, word) in [
             ("[[scanner]]\nposition = [0, 0, nan]", "finite"),
@@ -163,6 +233,9 @@ mod tests {
             ("[[scanner]]\nposition = [0, 0]", "TOML"),
             ("[[scanner]]\nposition = [0,0,0]\npoint_source_id = 70000", "TOML"),
             ("[[scanner]]\nposition = [0,0,0]\n[[scanner]]\nposition = [0,0,0]", "same name"),
+            ("[[scanner]]\nposition = [0,0,0]\nsigma = [1e-4, -1e-4, 0]", "sigma"),
+            ("[[scanner]]\nposition = [0,0,0]\nplaces = [[5, 9], [9, 12]]", "places"),
+            ("[[scanner]]\nposition = [0,0,0]\nplaces = [[5, 4]]", "places"),
             ("{", "JSON"),
             ("", "scanner"),
         ] {

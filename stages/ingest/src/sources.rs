@@ -6,17 +6,18 @@ use crate::file::OpenFile;
 use crate::format::detect;
 use crate::las::Las;
 use crate::looked::{InputLooks, KeepLooks, KeepNone};
+use crate::place_look;
 use crate::poses::Poses;
 use crate::raster::StepSource;
 use crate::reader::{self, Extent, FileReading, Reader, Want};
 use crate::regular::regular;
-use crate::scanners::KnownScanners;
+use crate::scanners::{KnownScanner, KnownScanners};
 use crate::settings::Settings;
 use crate::units::{Choice, ReferenceSystem, Units};
 use contract::{
-    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, Strip, Weigh,
+    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, ScannerPosition,
+    Strip, Weigh,
 };
-use geometry::Pose;
 use std::path::{Path, PathBuf};
 
 /// Iterator over the strips of one input, in file order.
@@ -75,18 +76,19 @@ pub fn open(
     open_after(Before::default(), paths, scanners, settings, fan)
 }
 
-/// Opens inputs as [`open`] does. Scans are sampled only where `looks` knows nothing of them.
+/// Opens inputs as [`open_after`] does. Scans are sampled only where `looks` knows nothing of them.
 ///
 /// # Errors
 /// As [`open`].
 pub fn open_known(
+    before: Before,
     paths: &[PathBuf],
     scanners: Option<&KnownScanners>,
     settings: &Settings,
     looks: &dyn KeepLooks,
     fan: &dyn Fan,
 ) -> Result<Sources> {
-    open_all(Before::default(), paths, scanners, settings, looks, fan)
+    open_all(before, paths, scanners, settings, looks, fan)
 }
 
 /// Opens inputs as [`open`] does, numbered after the inputs of an earlier run.
@@ -314,13 +316,13 @@ impl Sources {
         self.files.push(file);
     }
 
-    /// Numbers masks and scans of an input; `pose` gives the pose that the user states for a scan.
-    fn take(
+    /// Numbers masks and scans of an input; `scanner` gives the scanner that the user states for a scan.
+    fn take<'a>(
         &mut self,
         path: PathBuf,
         n_bytes: u64,
         reader: Box<dyn Reader>,
-        mut pose: impl FnMut(&str) -> Option<Pose>,
+        mut scanner: impl FnMut(&str) -> Option<&'a KnownScanner>,
     ) -> OpenFile {
         let id = InputId(self.inputs.len() as u32);
         let (first_scan, first_mask) = (self.scans.len() as u32, self.masks.len() as u32);
@@ -337,7 +339,7 @@ impl Sources {
         let spreads = Vec::new();
         let mut file = OpenFile { reader, first_scan, first_mask, moved, known, steps, spreads };
         for i in 0..file.reader.scans().len() {
-            let scan = scan_of(id, &mut file, i, &mut pose);
+            let scan = scan_of(id, &mut file, i, &mut scanner);
             self.scans.push(scan);
         }
         file
@@ -384,6 +386,9 @@ impl Sources {
                 file.steps.push(looked.raster.map_or(StepSource::None, |r| r.steps));
                 file.spreads.push(looked.spread);
                 file.known[i] &= !looked.is_misplaced;
+                if looked.is_misplaced {
+                    self.scans[at].scanner = ScannerPosition::Unknown;
+                }
             }
         }
         Ok(())
@@ -391,11 +396,11 @@ impl Sources {
 }
 
 /// A scan of a file, still without lattice. LAS poses are in the file's own scans already.
-fn scan_of(
+fn scan_of<'a>(
     input: InputId,
     file: &mut OpenFile,
     i: usize,
-    pose: &mut impl FnMut(&str) -> Option<Pose>,
+    scanner: &mut impl FnMut(&str) -> Option<&'a KnownScanner>,
 ) -> Scan {
     let seed = &file.reader.scans()[i];
     let mut scan = Scan {
@@ -404,6 +409,8 @@ fn scan_of(
         mask: MaskId(file.first_mask + seed.mask as u32),
         name: seed.name.clone(),
         source_id: seed.source_id,
+        places: seed.places.clone(),
+        scanner: seed.position,
         world_from_scan: seed.world_from_scan,
         lattice: None,
         stated_bounds: seed.stated_bounds,
@@ -412,13 +419,18 @@ fn scan_of(
     };
     let replaced = match file.reader.format() {
         Format::Las | Format::Laz | Format::Memory => None,
-        Format::E57 | Format::Ptx => pose(&seed.name),
+        Format::E57 | Format::Ptx => scanner(&seed.name),
     };
     file.known.push(seed.scanner_known || replaced.is_some());
-    file.moved.push(replaced.map(|pose| pose.inverse() * seed.world_from_scan));
-    if let Some(pose) = replaced {
-        scan.world_from_scan = pose;
-        scan.notes.push("the scanner's position is that of --scanners, not of the file".into());
+    let moved = |known: &KnownScanner| known.world_from_scan.inverse() * seed.world_from_scan;
+    file.moved.push(replaced.map(moved));
+    if let Some(known) = replaced {
+        scan.world_from_scan = known.world_from_scan;
+        scan.scanner = known.position();
+        scan.notes.push(match scan.scanner {
+            ScannerPosition::Found { sigma } => place_look::found_note(sigma),
+            _ => "the scanner's position is that of --scanners, not of the file".into(),
+        });
     }
     scan
 }

@@ -17,7 +17,8 @@
 //!     pixel.push((row * 256 + col) as u16);
 //! }
 //! # let scan = Scan { id: ScanId(0), input: contract::InputId(0), mask: MaskId(0), notes: vec![],
-//! #     name: String::new(), source_id: None, world_from_scan: Pose::identity(),
+//! #     name: String::new(), source_id: None, places: vec![], world_from_scan: Pose::identity(),
+//! #     scanner: contract::ScannerPosition::Stated,
 //! #     lattice: Some(lattice), stated_bounds: None, stated_points: None };
 //! let n_all = xyz.len() as u64;
 //! let tile = Tile { at, first_place: 0, place: (0..n_all as u32).collect(), pixel, xyz,

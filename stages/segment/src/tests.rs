@@ -142,6 +142,8 @@ fn scan(world_from_scan: Pose) -> Scan {
         mask: MaskId(0),
         name: "s".into(),
         source_id: None,
+        places: Vec::new(),
+        scanner: contract::ScannerPosition::Stated,
         world_from_scan,
         lattice: Some(Lattice::new(0.0015, 0.0015, 0.0, 0.0)),
         stated_bounds: None,

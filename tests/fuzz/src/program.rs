@@ -74,6 +74,8 @@ pub fn small_store(dir: &Path) {
         mask: MaskId(0),
         name: "one".into(),
         source_id: None,
+        places: Vec::new(),
+        scanner: contract::ScannerPosition::Unknown,
         world_from_scan: Pose::identity(),
         lattice: None,
         stated_bounds: None,

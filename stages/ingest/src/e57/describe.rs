@@ -61,6 +61,8 @@ impl E57Scan {
             name: name.into(),
             mask: 0,
             source_id: None,
+            places: Vec::new(),
+            position: scan.frame.position(),
             world_from_scan: scan.frame.world_from_scan,
             scanner_known: scan.frame.scanner_known,
             stated_bounds,

@@ -91,6 +91,8 @@ pub fn scan(position: [f64; 3], yaw: f64, step: f64) -> Scan {
         mask: MaskId(0),
         name: "room".into(),
         source_id: None,
+        places: Vec::new(),
+        scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::new(Vector::from(position), Vector::z() * yaw),
         lattice: Some(Lattice::new(step, step, 0.0, 0.0)),
         stated_bounds: None,

@@ -1,0 +1,183 @@
+//! Finds the setups of each cloud whose scanner is not known.
+
+use super::owned::Ownership;
+use super::stretches;
+use super::words;
+use crate::engine::{AllThreads, Engine};
+use contract::{Format, MaskId, Result, Scan, ScannerPosition};
+use ingest::{KnownScanner, PointWindow, Sources, WindowSample};
+use serde::Serialize;
+use setups::{FoundSetups, ScanWindow, Setup};
+use std::path::Path;
+
+/// Number of windows of a cloud that are looked at first, and where these leave much unexplained or
+/// hold many setups; and the points of each.
+const WINDOWS: [u64; 2] = [800, 6_000];
+const WINDOW_POINTS: u64 = 512;
+/// Windows of a setup below which more are read.
+const PER_SETUP: usize = 60;
+/// Share of windows without a setup above which more are read.
+const UNEXPLAINED: f64 = 0.1;
+/// Largest standard deviation of a position that is used, metres: free space is judged to a few
+/// millimetres.
+const MOST_SIGMA: f64 = 0.005;
+
+/// What was found in a cloud: a scan whose scanner the file does not state.
+#[derive(Debug, Clone, Serialize)]
+pub struct CloudSetups {
+    /// Mask of its points, which keeps its number when scans are told apart.
+    #[serde(skip)]
+    pub mask: MaskId,
+    /// Path of its file.
+    pub input: String,
+    /// Name of the scan.
+    pub name: String,
+    /// The setups, those of more columns first.
+    pub setups: Vec<SetupOfCloud>,
+    /// Why there is no setup, or none for some of the points.
+    pub unknown: Option<String>,
+    /// Share of the windows looked at that were measured from the setups.
+    pub explained: f64,
+}
+
+/// A setup of a cloud.
+#[derive(Debug, Clone, Serialize)]
+pub struct SetupOfCloud {
+    /// Position of the scanner, metres.
+    pub position: [f64; 3],
+    /// Standard deviation of the position along x, y, z, metres.
+    pub sigma: [f64; 3],
+    /// Angle between the scanner's axis and the vertical, degrees.
+    pub tilt_deg: f64,
+    /// Elevation between rows, degrees.
+    pub row_step_deg: f64,
+    /// Azimuth between columns, degrees, where neighbouring columns were seen.
+    pub col_step_deg: Option<f64>,
+    /// The evidence in words.
+    pub evidence: String,
+    /// Whether `run` can use it, since it is known which points are its own.
+    pub is_usable: bool,
+    /// Which points are its own.
+    #[serde(skip)]
+    pub ownership: Ownership,
+    /// The entry of a scanners file.
+    #[serde(skip)]
+    pub entry: KnownScanner,
+}
+
+impl CloudSetups {
+    /// Entries of a scanners file for the setups that can be used.
+    pub fn entries(&self) -> impl Iterator<Item = KnownScanner> + '_ {
+        self.setups.iter().filter(|setup| setup.is_usable).map(|setup| setup.entry.clone())
+    }
+}
+
+/// Finds the setups of all clouds whose scanner is not known.
+///
+/// # Errors
+/// If an input is broken where it is read.
+pub fn find(sources: &Sources, engine: &Engine) -> Result<Vec<CloudSetups>> {
+    let opened = sources.opened();
+    let is_open = |scan: &&Scan| opened.iter().any(|input| input.id == scan.input);
+    let unknown = sources.scans.iter().filter(is_open);
+    let unknown: Vec<&Scan> = unknown
+        .filter(|s| s.scanner == ScannerPosition::Unknown && s.stated_points != Some(0))
+        .collect();
+    engine.each(unknown, |scan| of_cloud(sources, scan))
+}
+
+fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
+    let (windows, found) = looked(sources, scan)?;
+    let input = &sources.inputs[scan.input.0 as usize];
+    let n_owned = found.owners.iter().filter(|owner| owner.is_some()).count();
+    let owned = if is_alone(sources, scan) {
+        stretches::of_setups(sources, scan, &windows, &found)?
+    } else {
+        vec![Ownership::Untold; found.setups.len()]
+    };
+    let stem = stem(&input.path);
+    let name = match input.format {
+        Format::Las | Format::Laz => stem.clone(),
+        Format::E57 | Format::Ptx | Format::Memory => scan.name.clone(),
+    };
+    let setups = found.setups.iter().zip(owned);
+    let setups: Vec<SetupOfCloud> =
+        setups.map(|(setup, own)| setup_of_cloud(setup, own, &name)).collect();
+    let n_usable = setups.iter().filter(|setup| setup.is_usable).count();
+    Ok(CloudSetups {
+        mask: scan.mask,
+        input: input.path.display().to_string(),
+        name: scan.name.clone(),
+        setups,
+        unknown: words::unknown(&found, is_alone(sources, scan), n_usable),
+        explained: n_owned as f64 / windows.len().max(1) as f64,
+    })
+}
+
+/// Windows of a cloud, and the setups in them; more windows where the first leave much open.
+fn looked(sources: &Sources, scan: &Scan) -> Result<(Vec<ScanWindow>, FoundSetups)> {
+    let mut last = (Vec::new(), FoundSetups::default());
+    for n_windows in WINDOWS {
+        let sample = WindowSample { n_windows, n_points: WINDOW_POINTS };
+        let read = sources.windows(scan.id, sample, &AllThreads)?;
+        let windows: Vec<ScanWindow> = read.into_iter().map(window).collect();
+        if windows.len() == last.0.len() {
+            break;
+        }
+        let found = setups::find(&windows, &setups::SetupLimits::default());
+        let n_open = found.owners.iter().filter(|owner| owner.is_none()).count();
+        let is_enough = windows.len() >= PER_SETUP * found.setups.len()
+            && n_open as f64 <= UNEXPLAINED * windows.len() as f64;
+        let is_hopeless = found.cause == Some(setups::Cause::NoColumns);
+        last = (windows, found);
+        if is_enough || is_hopeless {
+            break;
+        }
+    }
+    Ok(last)
+}
+
+fn window(read: PointWindow) -> ScanWindow {
+    ScanWindow { place: read.place, source: u32::from(read.source_id), points: read.points }
+}
+
+/// Whether the name of a scan names it alone, so that an entry of a scanners file can mean it.
+fn is_alone(sources: &Sources, scan: &Scan) -> bool {
+    let own = &sources.inputs[scan.input.0 as usize];
+    let is_las = |format| matches!(format, Format::Las | Format::Laz);
+    if is_las(own.format) {
+        let same = sources.opened().iter().filter(|i| stem(&i.path) == stem(&own.path));
+        return same.count() == 1;
+    }
+    sources.scans.iter().filter(|other| other.name == scan.name).count() == 1
+}
+
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned())
+}
+
+fn setup_of_cloud(setup: &Setup, ownership: Ownership, name: &str) -> SetupOfCloud {
+    let is_sure = setup.largest_sigma() <= MOST_SIGMA;
+    let (point_source_id, places) = match &ownership {
+        Ownership::Source(id) => (Some(*id), Vec::new()),
+        Ownership::Places(places) => (None, places.clone()),
+        Ownership::Whole | Ownership::Untold => (None, Vec::new()),
+    };
+    SetupOfCloud {
+        position: setup.position(),
+        sigma: setup.sigma,
+        tilt_deg: setup.tilt().to_degrees(),
+        row_step_deg: setup.comb[1].to_degrees(),
+        col_step_deg: setup.col_step.map(f64::to_degrees),
+        evidence: words::evidence(setup),
+        is_usable: is_sure && ownership != Ownership::Untold,
+        entry: KnownScanner {
+            point_source_id,
+            name: Some(name.to_owned()),
+            world_from_scan: setup.world_from_scanner,
+            sigma: Some(setup.sigma),
+            places,
+        },
+        ownership,
+    }
+}

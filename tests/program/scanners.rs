@@ -1,0 +1,287 @@
+//! Scanner positions that a cloud does not state are found from its points, by `scanners` and by a
+//! run; where they cannot be found, it is said why.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use stillpoint::engine::Engine;
+use stillpoint::eval::virtual_scan::{Formats, scan_scene};
+
+/// A hall with furniture and three tilted scanners.
+const HALL: &str = r#"
+seed = 77
+[hall]
+size = [13.0, 9.0, 4.5]
+[floor]
+[[box]]
+name = "a"
+xyz = [1.5, 1.0, 0.75]
+size = [1.0, 0.8, 1.5]
+[[box]]
+name = "b"
+xyz = [-2.0, -1.5, 0.9]
+size = [0.8, 1.2, 1.8]
+[[column]]
+xy = [-1.0, 2.0]
+radius = 0.3
+height = 4.5
+[[scanner]]
+name = "s1"
+position = [4.5, 3.0, 1.6]
+rpy_deg = [1.5, -0.7, 30.0]
+raster = { n_beams = 300_000 }
+noise = 0.002
+registration = { xyz = [0.004, -0.002, 0.001], rpy_deg = [0.02, 0.05, -0.1] }
+[[scanner]]
+name = "s2"
+position = [-4.5, 0.5, 1.5]
+rpy_deg = [-0.8, 1.1, 200.0]
+raster = { n_beams = 400_000 }
+noise = 0.003
+dropouts = 0.05
+[[scanner]]
+name = "s3"
+position = [0.5, -3.5, 1.7]
+raster = { n_beams = 350_000 }
+noise = 0.001
+"#;
+
+fn stillpoint(dir: &Path, args: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_stillpoint");
+    let args = args.iter().copied().chain(["--progress", "none"]);
+    Command::new(program).args(args).current_dir(dir).output().expect("starts")
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// The hall's scans, in `scans`.
+fn hall() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a folder");
+    let hall = simulate::Scene::from_toml(HALL).expect("a scene");
+    let formats = Formats { labels: false, ..Formats::ALL };
+    scan_scene(&hall, &[], &dir.path().join("scans"), formats, &Engine::new(2)).expect("scans");
+    dir
+}
+
+/// Positions that the scans' own file of scanners states.
+fn stated(dir: &Path) -> Vec<[f64; 3]> {
+    let text = std::fs::read_to_string(dir.join("scans/scanners.toml")).expect("scanners");
+    let known = ingest::KnownScanners::parse(&text).expect("parses");
+    known.entries.iter().map(|e| e.world_from_scan.translation.vector.into()).collect()
+}
+
+/// Writes the LAS file again with its records as `change` leaves them.
+fn changed(dir: &Path, name: &str, change: impl Fn(&mut Vec<Vec<u8>>)) {
+    let mut bytes = std::fs::read(dir.join("scans/scans.las")).expect("reads");
+    let start = u32::from_le_bytes(bytes[96..100].try_into().expect("four")) as usize;
+    let len = usize::from(u16::from_le_bytes(bytes[105..107].try_into().expect("two")));
+    let mut records: Vec<Vec<u8>> = bytes[start..].chunks_exact(len).map(<[u8]>::to_vec).collect();
+    change(&mut records);
+    bytes.truncate(start);
+    bytes.extend(records.concat());
+    std::fs::write(dir.join(name), bytes).expect("writes");
+}
+
+fn without_ids(records: &mut [Vec<u8>]) {
+    records.iter_mut().for_each(|r| r[20..22].fill(0));
+}
+
+/// Asserts that each stated position is found within a millimetre, and nothing else.
+fn assert_found(setups: &Value, dir: &Path) {
+    let setups = setups.as_array().expect("a list");
+    let truth = stated(dir);
+    assert_eq!(setups.len(), truth.len(), "{setups:?}");
+    for at in truth {
+        let off = |setup: &Value| {
+            (0..3)
+                .map(|a| (setup["position"][a].as_f64().expect("a number") - at[a]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        };
+        assert!(setups.iter().any(|setup| off(setup) < 0.001), "{at:?}: {setups:?}");
+    }
+}
+
+#[test]
+fn positions_are_found_written_and_used() {
+    let dir = hall();
+    let at = dir.path();
+    let args = ["scanners", "scans/scans.las", "--json"];
+    let one = stillpoint(at, &[&args[..], &["--threads", "1"]].concat());
+    let four = stillpoint(at, &[&args[..], &["--threads", "4", "--out", "found.toml"]].concat());
+    assert_eq!(one.status.code(), Some(0), "{}", String::from_utf8_lossy(&one.stderr));
+    assert!(one.stdout == four.stdout, "the answer depends on threads");
+    let found = json(&one);
+    assert_eq!(found["schema"], "stillpoint.scanners/1");
+    assert_found(&found["clouds"][0]["setups"], at);
+    let seen =
+        stillpoint(at, &["inspect", "scans/scans.las", "--scanners", "found.toml", "--json"]);
+    let scans = json(&seen)["inputs"][0]["scans"].as_array().expect("a list").clone();
+    assert_eq!(scans.len(), 3);
+    assert!(scans.iter().all(|s| s["scanner_known"] == true && s["lattice"].is_object()));
+    let by_name = stillpoint(at, &["inspect", "scans/scans.las", "--scanners", "auto", "--json"]);
+    // A quaternion that is read is made of unit length again, which may change its last digit.
+    let at_once = json(&by_name)["inputs"][0]["scans"].clone();
+    for (one, other) in scans.iter().zip(at_once.as_array().expect("a list")) {
+        assert_eq!(one["world_from_scan"]["xyz"], other["world_from_scan"]["xyz"]);
+        let step = |scan: &Value| scan["lattice"]["row_step_deg"].as_f64().expect("a number");
+        assert!((step(one) - step(other)).abs() < 1e-9);
+    }
+    let plain = json(&stillpoint(at, &["inspect", "scans/scans.las", "--json"]));
+    assert_eq!(plain["inputs"][0]["scans"][0]["scanner_known"], false);
+}
+
+#[test]
+fn points_without_ids_are_told_apart_by_their_places() {
+    let dir = hall();
+    let at = dir.path();
+    changed(at, "merged.las", |records| without_ids(records));
+    let found = stillpoint(at, &["scanners", "merged.las", "--out", "found.toml", "--json"]);
+    assert_eq!(found.status.code(), Some(0), "{}", String::from_utf8_lossy(&found.stderr));
+    assert_found(&json(&found)["clouds"][0]["setups"], at);
+    let text = std::fs::read_to_string(at.join("found.toml")).expect("written");
+    let known = ingest::KnownScanners::parse(&text).expect("parses");
+    let n_points: Vec<u64> = {
+        let truth = std::fs::read_to_string(at.join("scans/truth/truth.json")).expect("truth");
+        let truth: Value = serde_json::from_str(&truth).expect("JSON");
+        truth["scans"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|s| s["n_points"].as_u64().expect("a count"))
+            .collect()
+    };
+    let mut ends: Vec<u64> =
+        known.entries.iter().flat_map(|e| e.places.last()).map(|p| p[1] + 1).collect();
+    ends.sort_unstable();
+    let mut total = 0;
+    for (end, n) in ends.iter().zip(n_points) {
+        total += n;
+        assert!(end.abs_diff(total) < 100, "{ends:?} {total}");
+    }
+    // Tiles in turn: the file is read once.
+    changed(at, "turns.las", |records| {
+        without_ids(records);
+        let third = records.len() / 3;
+        let pieces: Vec<Vec<Vec<u8>>> =
+            records.chunks(third / 40).map(<[Vec<u8>]>::to_vec).collect();
+        let n = pieces.len();
+        *records = (0..n).map(|i| pieces[i * 41 % n].clone()).collect::<Vec<_>>().concat();
+    });
+    let found = stillpoint(at, &["scanners", "turns.las", "--out", "turns.toml", "--json"]);
+    assert_found(&json(&found)["clouds"][0]["setups"], at);
+    let seen = stillpoint(at, &["inspect", "turns.las", "--scanners", "turns.toml", "--json"]);
+    let scans = json(&seen)["inputs"][0]["scans"].clone();
+    let n_known = scans.as_array().expect("a list").iter().filter(|s| s["scanner_known"] == true);
+    assert_eq!(n_known.count(), 3, "{scans}");
+}
+
+#[test]
+fn a_shuffled_cloud_is_unknown_with_its_cause() {
+    let dir = hall();
+    let at = dir.path();
+    changed(at, "shuffled.las", |records| {
+        let n = records.len();
+        // A step without a divisor in common with the number of records visits all of them.
+        let step = (n * 5 / 8..n).find(|s| gcd(*s, n) == 1).expect("a step");
+        *records = (0..n).map(|i| records[(i * step) % n].clone()).collect();
+    });
+    let found = stillpoint(at, &["scanners", "shuffled.las", "--out", "found.toml", "--json"]);
+    assert_eq!(found.status.code(), Some(3), "{}", String::from_utf8_lossy(&found.stderr));
+    let cloud = json(&found)["clouds"][0].clone();
+    assert_eq!(cloud["setups"].as_array().map(Vec::len), Some(0));
+    assert!(cloud["unknown"].as_str().is_some_and(|cause| cause.contains("order")), "{cloud}");
+    let seen = stillpoint(at, &["inspect", "shuffled.las", "--scanners", "found.toml"]);
+    assert_eq!(seen.status.code(), Some(0), "{}", String::from_utf8_lossy(&seen.stderr));
+    let over = stillpoint(at, &["scanners", "shuffled.las", "--out", "shuffled.las"]);
+    assert_eq!(over.status.code(), Some(2));
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[test]
+fn a_run_uses_found_positions_says_so_and_is_the_same_again() {
+    let dir = hall();
+    let at = dir.path();
+    stillpoint::eval::demo::write_robots(&at.join("robots")).expect("a library");
+    let run = |out: &str, more: &[&str]| {
+        let args = ["run", "scans/scans.las", "--robots", "robots", "--out", out];
+        let output = stillpoint(at, &[&args[..], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read(at.join(out).join("result.json")).expect("a result");
+        (serde_json::from_slice::<Value>(&text).expect("JSON"), output)
+    };
+    let (found, _) = run("found", &["--threads", "1"]);
+    let scans = found["inputs"][0]["scans"].as_array().expect("a list");
+    assert_eq!(scans.len(), 3);
+    assert!(scans.iter().all(|s| s["scanner"] == "found" && s["sigma"][0].as_f64() < Some(0.001)));
+    let warnings = found["warnings"].to_string();
+    assert!(!warnings.contains("position is not known"), "{warnings}");
+    let (again, output) = run("found", &["--threads", "2"]);
+    assert_eq!(found, again);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        said.contains("unchanged") || said.contains("reused") || said.contains("again"),
+        "{said}"
+    );
+    let (unknown, _) = run("unknown", &["--scanners", "none"]);
+    let scans = unknown["inputs"][0]["scans"].as_array().expect("a list");
+    assert!(scans.iter().all(|s| s["scanner"] == "unknown" && s["position"].is_null()));
+    let (given, _) = run("given", &["--scanners", "scans/scanners.toml"]);
+    let scans = given["inputs"][0]["scans"].as_array().expect("a list");
+    assert!(scans.iter().all(|s| s["scanner"] == "given" && s["sigma"].is_null()));
+}
+
+/// Setups of the points of a real file in their order, with those that it states.
+fn of_real(name: &str) -> Option<(setups::FoundSetups, Vec<[f64; 3]>)> {
+    let path =
+        std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/scans").join(name);
+    if !path.exists() {
+        return None;
+    }
+    let settings = ingest::Settings::default();
+    let sources = ingest::open(&[path], None, &settings, &contract::OneByOne).expect("opens");
+    let mut points: Vec<[f64; 3]> = Vec::new();
+    for strip in sources.strips(contract::InputId(0), ingest::Want::Coordinates).expect("reads") {
+        let strip = strip.expect("reads");
+        let pose = sources.scans[strip.scan.0 as usize].world_from_scan;
+        points.extend(
+            strip
+                .xyz
+                .iter()
+                .map(|p| -> [f64; 3] { (pose * nalgebra::Point3::from(p.map(f64::from))).into() }),
+        );
+    }
+    let window = |(i, points): (usize, &[[f64; 3]])| setups::ScanWindow {
+        place: i as u64 * 512,
+        source: 0,
+        points: points.to_vec(),
+    };
+    let windows: Vec<setups::ScanWindow> = points.chunks(512).enumerate().map(window).collect();
+    let at = sources.scans.iter().map(|s| s.world_from_scan.translation.vector.into()).collect();
+    Some((setups::find(&windows, &setups::SetupLimits::default()), at))
+}
+
+#[test]
+fn real_scanners_are_found_where_they_stood() {
+    let off = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+    for (name, n) in [
+        ("kurt3d-corridor/kurt_2scans.ptx", 2),
+        ("kurt3d-corridor/kurt_2scans_cartesian.e57", 2),
+        ("e57-real-pump/pumpAVisualReferenceImage.e57", 0),
+    ] {
+        let Some((found, truth)) = of_real(name) else { continue };
+        assert!(found.setups.len() >= n, "{name}: {:?}", found.cause);
+        for setup in &found.setups {
+            let nearest =
+                truth.iter().map(|at| off(*at, setup.position())).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 0.005, "{name}: {nearest} m off: {setup:?}");
+        }
+        assert!(found.setups.len() <= truth.len());
+    }
+}
