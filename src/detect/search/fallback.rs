@@ -2,7 +2,9 @@
 //! walls and ceilings, behind other objects, on hidden stands, and robots that moved between scans.
 
 use super::tried::TriedBases;
-use super::{GUESS_BREADTH, MAX_SUNK, SAME_BASE, Search, base, breadth};
+use super::{
+    MAX_SUNK, MIN_SHARE_OF_GUESS, SAME_BASE, Search, SearchExtent, base, best_of_place, breadth,
+};
 use crate::engine::AllThreads;
 use base_search::RegionEvidence;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
@@ -32,6 +34,8 @@ const MAX_LEFT_OVER: usize = 4;
 /// Factor on the number of base poses in front of walls and plates, where a place occurs at five
 /// heights at most.
 const RAISED_BREADTH: usize = 2;
+/// Factor on the number of base poses on guessed stands, since each place occurs at many heights.
+const STAND_BREADTH: usize = 4;
 /// Least height above the floor of a base on a wall, metres.
 const FLOOR_SLACK: f64 = 0.05;
 /// Least score of a base that is examined for a robot that moved between scans.
@@ -90,10 +94,14 @@ impl Search<'_, '_> {
             (name.to_owned(), mounts.clone(), 1),
             (format!("{name} raised"), base_search::raised_planes(&mounts), RAISED_BREADTH),
         ] {
-            let find = || self.candidates(sight, &planes, MIN_MOUNT_SCORE, breadth);
+            let find = || {
+                let places = Some(MAX_MOUNTS);
+                let extent = SearchExtent { min_score: MIN_MOUNT_SCORE, breadth, places };
+                self.candidates(sight, &planes, extent)
+            };
             let mut hung = self.piece(scene.region, &name, find)?;
             hung.retain(|c| self.is_above_floor(c) && is_wanted(c));
-            fits.extend(self.fits(scene, &few(hung, MAX_MOUNTS), tried)?);
+            fits.extend(self.fits(scene, &likely(hung, MAX_MOUNTS), tried)?);
             if fits.iter().any(|fit: &Fit| fit.verdict == Verdict::Trusted) {
                 break;
             }
@@ -126,10 +134,14 @@ impl Search<'_, '_> {
         tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
-        let find = || self.candidates(sight, planes, 0.0, BREADTH.max(breadth(planes)));
+        let find = || {
+            let breadth = BREADTH.max(breadth(planes));
+            let extent = SearchExtent { min_score: 0.0, breadth, places: Some(MAX_LEFT_OVER) };
+            self.candidates(sight, planes, extent)
+        };
         let mut found = self.piece(scene.region, "left over", find)?;
         found.retain(|c| is_apart(c, &feet));
-        self.fits(scene, &few(found, MAX_LEFT_OVER), tried)
+        self.fits(scene, &likely(found, MAX_LEFT_OVER), tried)
     }
 
     /// Fits of robots whose feet hide their stands: where trusted robots leave many points
@@ -148,10 +160,14 @@ impl Search<'_, '_> {
         let Some(floor) = height.map(|h| at.z - h) else { return Ok(Vec::new()) };
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
         let planes = base_search::stand_planes(&region.world_bounds(), floor);
-        let find = || self.candidates(sight, &planes, MIN_STAND_SCORE, GUESS_BREADTH);
+        let find = || {
+            let (breadth, places) = (STAND_BREADTH, Some(MAX_MOUNTS));
+            let extent = SearchExtent { min_score: MIN_STAND_SCORE, breadth, places };
+            self.candidates(sight, &planes, extent)
+        };
         let mut found = self.piece(region, "stands", find)?;
         found.retain(|c| is_apart(c, &feet) && is_wanted(c));
-        self.fits(scene, &few(found, MAX_MOUNTS), tried)
+        self.fits(scene, &likely(found, MAX_MOUNTS), tried)
     }
 
     /// Restricts the scene to points that are on no trusted robot. Returns the bases of those
@@ -186,7 +202,8 @@ impl Search<'_, '_> {
         if gone.len() < MIN_GONE {
             return Vec::new();
         }
-        let feet = self.candidates(&sight.scan_by_scan(), scans.floors, 0.0, breadth(scans.floors));
+        let feet =
+            self.candidates(&sight.scan_by_scan(), scans.floors, SearchExtent::plain(scans.floors));
         let mut out: Vec<Fit> = Vec::new();
         let in_reach = |candidate: &&Candidate| {
             let here = base(&candidate.bases[0].0) - scans.region.origin.coords;
@@ -213,6 +230,12 @@ impl Search<'_, '_> {
 fn is_apart(candidate: &Candidate, feet: &[Point]) -> bool {
     let here = base(&candidate.bases[0].0);
     !feet.iter().any(|at| (at - here).norm() < SAME_BASE)
+}
+
+/// The best candidates of each model, at most `most`, without those that others at their place
+/// leave far behind.
+fn likely(candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
+    best_of_place(few(candidates, most), MIN_SHARE_OF_GUESS)
 }
 
 /// The best candidates of each model, at most `most`.

@@ -2,7 +2,7 @@
 //! height of the base are open. The place need not lie in a region of unexplained points.
 
 use super::tried::TriedBases;
-use super::{GUESS_BREADTH, SAME_BASE, Search, base, breadth, feet};
+use super::{GUESS_BREADTH, SAME_BASE, Search, SearchExtent, base, breadth, feet};
 use crate::detect::robots::{region, standing};
 use crate::engine::AllThreads;
 use base_search::RegionEvidence;
@@ -111,7 +111,8 @@ impl Search<'_, '_> {
         if planes.is_empty() {
             return Vec::new();
         }
-        let mut found = self.candidates_of(hint.model, sight, planes, 0.0, breadth);
+        let extent = SearchExtent { min_score: 0.0, breadth, places: None };
+        let mut found = self.candidates_of(hint.model, sight, planes, extent);
         found.retain(|c| {
             let pose = c.bases.first();
             pose.is_some_and(|pose| (base(&pose.0) - hint.at).norm() <= hint.radius)

@@ -15,7 +15,7 @@ pub(crate) const EDGE: f32 = 0.03;
 /// Limit of the cells; a larger region has larger ones.
 const MAX_CELLS: f64 = 16e6;
 /// Least tolerance that the grid serves, as a multiple of a cell's edge.
-pub(crate) const COARSE: f32 = 1.4;
+pub(crate) const COARSE: f32 = 1.25;
 /// Ratio of neighbouring tolerances that the grid has scores for. A twentieth more or less than the
 /// requested tolerance does not change which place is best.
 pub(crate) const RUNG: f32 = 1.1;

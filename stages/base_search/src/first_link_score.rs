@@ -2,6 +2,7 @@
 //! the shape of a robot's base, but few have the shape of a base with a carousel on it.
 
 use geometry::{Plane, Pose, Probe};
+use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use crate::first_link::FirstLink;
@@ -30,6 +31,15 @@ const N_QUICK_VALUES: usize = 6;
 const N_LIKELY: usize = 3;
 /// Tolerance of the first link as a multiple of the base's: its joint has steps, too.
 const FIRST_LINK_REACH: f32 = 1.5;
+
+/// Which bases are plausible, as far as it was asked: places are judged again after each batch.
+#[derive(Debug, Default)]
+pub(crate) struct PlausibleBases(HashMap<[u64; 4], bool>);
+
+/// The pose of a trial as a key.
+fn key(trial: &BaseTrial) -> [u64; 4] {
+    [trial.plane as u64, trial.x.to_bits(), trial.y.to_bits(), trial.yaw.to_bits()]
+}
 
 impl BaseSearch<'_> {
     /// Whether the judged samples of base and first link fit the beams. Large parts of a cabinet
@@ -65,12 +75,17 @@ impl BaseSearch<'_> {
     /// front. The best pose may stand at the right place with a wrong yaw: of a base that plates
     /// mostly hide, the samples determine the yaw less than the links above it. Such a base is also
     /// tried at the yaw that its judged samples fit best.
-    pub(crate) fn accept(&self, local: &[Plane], place: &mut Vec<BaseTrial>) -> bool {
-        if place
-            .iter()
-            .take(N_JUDGED_POSES)
-            .any(|trial| self.is_plausible(&local[trial.plane], trial))
-        {
+    pub(crate) fn accept(
+        &self,
+        local: &[Plane],
+        place: &mut Vec<BaseTrial>,
+        known: &mut PlausibleBases,
+    ) -> bool {
+        let mut is_plausible = |trial: &BaseTrial| {
+            let find = || self.is_plausible(&local[trial.plane], trial);
+            *known.0.entry(key(trial)).or_insert_with(find)
+        };
+        if place.iter().take(N_JUDGED_POSES).any(&mut is_plausible) {
             return true;
         }
         let Some(best) = place.first().copied() else { return false };
@@ -84,7 +99,7 @@ impl BaseSearch<'_> {
             (judged_score(&self.probe_base(plane, &trial)), trial)
         });
         let turned = turned.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, trial)| trial);
-        let found = turned.filter(|trial| self.is_plausible(plane, trial));
+        let found = turned.filter(is_plausible);
         found.into_iter().for_each(|trial| place.insert(0, trial));
         found.is_some()
     }

@@ -53,13 +53,19 @@ impl BaseSearch<'_> {
         level: &SearchLevel,
         fan: &dyn Fan,
     ) -> Vec<BaseTrial> {
+        let climbed = self.climb_all(planes, trials, level, fan);
+        self.rate(planes, climbed, level, fan)
+    }
+
+    /// Climbs from each trial to a local maximum: the trials around it, with quick scores.
+    pub(crate) fn climb_all(
+        &self,
+        planes: &[Plane],
+        trials: &[BaseTrial],
+        level: &SearchLevel,
+        fan: &dyn Fan,
+    ) -> Vec<BaseTrial> {
         let tolerance = level.tolerance();
-        let kept = Thinning {
-            keep: level.keep,
-            quota: level.quota,
-            step: level.step * 0.6,
-            yaw_step: level.yaw * 0.6,
-        };
         let around = |trial: BaseTrial| -> Vec<BaseTrial> {
             let firsts = self.likely_first_links(&planes[trial.plane], &trial, tolerance);
             let mut near =
@@ -70,10 +76,26 @@ impl BaseSearch<'_> {
             }
             near
         };
-        let mut out: Vec<BaseTrial> =
-            fan.fan(trials.to_vec(), around).into_iter().flatten().collect();
-        best(&mut out, Thinning { keep: 2 * kept.keep, quota: 2 * kept.quota, ..kept });
-        let mut out = fan.fan(out, |t| self.with_first_link(&planes[t.plane], t, tolerance));
+        fan.fan(trials.to_vec(), around).into_iter().flatten().collect()
+    }
+
+    /// The best of these trials, scored with base and first link on the level's grid.
+    pub(crate) fn rate(
+        &self,
+        planes: &[Plane],
+        mut trials: Vec<BaseTrial>,
+        level: &SearchLevel,
+        fan: &dyn Fan,
+    ) -> Vec<BaseTrial> {
+        let tolerance = level.tolerance();
+        let kept = Thinning {
+            keep: level.keep,
+            quota: level.quota,
+            step: level.step * 0.6,
+            yaw_step: level.yaw * 0.6,
+        };
+        best(&mut trials, Thinning { keep: 2 * kept.keep, quota: 2 * kept.quota, ..kept });
+        let mut out = fan.fan(trials, |t| self.with_first_link(&planes[t.plane], t, tolerance));
         best(&mut out, kept);
         out
     }

@@ -32,6 +32,8 @@ pub struct BaseSearch<'a> {
     pub(crate) min_score: f64,
     /// Factor on the number of base poses that are kept at each level.
     pub(crate) breadth: usize,
+    /// Number of places that are wanted, if not that of the settings.
+    pub(crate) places: Option<usize>,
 }
 
 impl<'a> BaseSearch<'a> {
@@ -74,6 +76,7 @@ impl<'a> BaseSearch<'a> {
             is_guess,
             min_score: settings.min_score,
             breadth: 1,
+            places: None,
         })
     }
 
@@ -88,6 +91,12 @@ impl<'a> BaseSearch<'a> {
     #[must_use]
     pub fn with_breadth(self, breadth: usize) -> Self {
         Self { breadth, ..self }
+    }
+
+    /// The same search for the best few places only.
+    #[must_use]
+    pub fn with_places(self, places: usize) -> Self {
+        Self { places: Some(places), ..self }
     }
 
     /// The same search for candidates with at least this score, or the least score of the settings

@@ -9,11 +9,14 @@ use contract::{Candidate, Fan, InstallationPlane};
 use geometry::{Plane, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 
+use crate::first_link_score::PlausibleBases;
 use crate::hill_climb::SearchLevel;
 use crate::problem::BaseSearch;
 use crate::regions::{GUESS_STEP, are_stacked};
 use crate::score_grid::Stencil;
-use crate::trial::{BaseTrial, QUOTA, SampleScore, Samples, Thinning, best, coarse_yaw};
+use crate::trial::{
+    BaseTrial, QUOTA, QUOTA_WITH_FIRST_LINK, SampleScore, Samples, Thinning, best, coarse_yaw,
+};
 
 /// Heights above a plane of the points that may belong to a base, metres: above the plane itself,
 /// and not above a robot's shoulder.
@@ -26,9 +29,9 @@ const MIN_CELLS: usize = 3;
 const MIN_IN_CELL: u32 = 3;
 /// Quick score (on a quarter of the samples, best of every other yaw) below which a place is
 /// dropped.
-const MIN_QUICK_SCORE: f64 = -0.2;
+const MIN_QUICK_SCORE: f64 = -0.05;
 /// Difference from the best quick score of a place up to which a yaw is scored with all samples.
-const YAW_LAG: f64 = 0.35;
+const YAW_LAG: f64 = 0.25;
 /// Largest stride between guessed planes at the coarse level: the next levels try two planes up and
 /// down, and then one.
 const MAX_STRIDE: usize = 6;
@@ -39,6 +42,13 @@ const COARSE_REACH: f64 = 1.3;
 const MIN_SHARE_COARSE: f64 = 0.4;
 /// Share of the least score that a base must reach at the middle level.
 const MIN_SHARE_MIDDLE: f64 = 0.6;
+/// Least mean score of the judged samples of a base on a coarse grid. The smallest value of 49
+/// robots that were found is 0.60.
+const MIN_JUDGED_COARSE: f64 = 0.5;
+/// Number of trials that are refined to the finest level at once.
+const FINE_BATCH: usize = 16;
+/// Number of poses of a place that are rated to compare places.
+const FEW_OF_A_PLACE: usize = 3;
 /// Area on the ground of one robot with its equipment, m².
 const CELL_AREA: f64 = 25.0;
 /// Largest number of robots that is expected in a region: a square of 12 m holds this many.
@@ -69,14 +79,21 @@ impl BaseSearch<'_> {
         let tolerance = self.coarse_tolerance();
         let mut trials =
             fan.fan(trials, |t| self.quick_with_first_link(&local[t.plane], t, tolerance));
-        best(&mut trials, Thinning { keep: self.settings.keep_coarse * cells, ..thinning });
+        best(
+            &mut trials,
+            Thinning {
+                keep: self.settings.keep_coarse * cells,
+                quota: QUOTA_WITH_FIRST_LINK,
+                ..thinning
+            },
+        );
         self.drop_low_scores(&mut trials, MIN_SHARE_COARSE);
         let middle = SearchLevel {
             step: step / 2.0,
             yaw: yaw_step / 2.0,
             rise: 2,
             keep: self.settings.keep_middle * cells,
-            quota: QUOTA,
+            quota: QUOTA_WITH_FIRST_LINK,
         };
         let mut trials = self.refine_level(&local, &trials, &middle, fan);
         self.drop_low_scores(&mut trials, MIN_SHARE_MIDDLE);
@@ -88,13 +105,27 @@ impl BaseSearch<'_> {
             keep: self.settings.max_places * cells * per_place,
             quota: per_place,
         };
-        let trials = self.refine_level(&local, &trials, &fine, fan);
+        let trials = self.refine_best_first(&local, &trials, &fine, fan);
         self.group(planes, &local, &trials)
     }
 
-    /// Drops trials that score less than a share of the least score.
+    /// Drops trials that score less than a share of the least score, and those that no finer level
+    /// could find plausible.
     fn drop_low_scores(&self, trials: &mut Vec<BaseTrial>, share: f64) {
-        trials.retain(|t| t.rating.score >= share * self.min_score);
+        trials.retain(|t| {
+            t.rating.score >= share * self.min_score && self.may_be_plausible(&t.rating)
+        });
+    }
+
+    /// Whether a pose of the coarsest grid is looked at more closely.
+    fn is_open(&self, rating: &SampleScore) -> bool {
+        rating.score > 0.0 && self.may_be_plausible(rating)
+    }
+
+    /// Whether a score on a coarse grid leaves room for a plausible base (`accept`).
+    fn may_be_plausible(&self, rating: &SampleScore) -> bool {
+        let is_judged = self.region.evidence.has_beams() && self.region.by_scan.is_empty();
+        !is_judged || rating.judged() >= MIN_JUDGED_COARSE
     }
 
     /// Number of robots that the region may hold, at least one. It scales the number of places that
@@ -175,14 +206,14 @@ impl BaseSearch<'_> {
             if top < MIN_QUICK_SCORE {
                 return Vec::new();
             }
-            let is_open = |k: usize| {
+            let is_near_top = |k: usize| {
                 few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()]) >= top - YAW_LAG
             };
-            let all = (0..n).filter(|k| is_open(*k)).filter_map(|k| {
+            let all = (0..n).filter(|k| is_near_top(*k)).filter_map(|k| {
                 let rating = look_up(k, self.settings.n_coarse);
                 let yaw = k as f64 * coarse_yaw();
                 let first = SampleScore::default();
-                (rating.score > 0.0).then_some(BaseTrial { x, y, yaw, plane: at, rating, first })
+                self.is_open(&rating).then_some(BaseTrial { x, y, yaw, plane: at, rating, first })
             });
             all.collect()
         };
@@ -252,31 +283,67 @@ impl BaseSearch<'_> {
         out
     }
 
+    /// Refines trials to the finest level in batches, best first. Ends where no other trial can
+    /// reach the score of the places that are wanted: a score falls from level to level, as the
+    /// tolerance does.
+    fn refine_best_first(
+        &self,
+        local: &[Plane],
+        trials: &[BaseTrial],
+        level: &SearchLevel,
+        fan: &dyn Fan,
+    ) -> Vec<BaseTrial> {
+        let mut sorted = trials.to_vec();
+        sorted.sort_by(|a, b| b.rating.score.total_cmp(&a.rating.score));
+        let few = SearchLevel { keep: 2 * FINE_BATCH, quota: FEW_OF_A_PLACE, ..*level };
+        let mut known = PlausibleBases::default();
+        let (mut climbed, mut rated): (Vec<BaseTrial>, Vec<BaseTrial>) = (Vec::new(), Vec::new());
+        for batch in sorted.chunks(FINE_BATCH) {
+            let found = self.wanted_places(local, &rated, &mut known);
+            let least = found.get(self.n_places().max(1) - 1).map(|p| p[0].rating.score);
+            if least.is_some_and(|least| batch[0].rating.score < least) {
+                break;
+            }
+            let of_batch = self.climb_all(local, batch, level, fan);
+            rated.extend(self.rate(local, of_batch.clone(), &few, fan));
+            climbed.extend(of_batch);
+        }
+        // All poses of the places that are wanted.
+        let found = self.wanted_places(local, &rated, &mut known);
+        let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
+        let radius = self.settings.place_radius;
+        let is_wanted = |t: &BaseTrial| found.iter().any(|p| (at(&p[0]) - at(t)).norm() < radius);
+        climbed.retain(is_wanted);
+        let all = SearchLevel { keep: self.n_places() * self.settings.bases_per_place, ..*level };
+        self.rate(local, climbed, &all, fan)
+    }
+
+    /// Number of places that are wanted.
+    fn n_places(&self) -> usize {
+        self.places.unwrap_or(self.settings.max_places * self.n_cells())
+    }
+
+    /// The places that are wanted among rated trials in any order.
+    fn wanted_places(
+        &self,
+        local: &[Plane],
+        rated: &[BaseTrial],
+        known: &mut PlausibleBases,
+    ) -> Vec<Vec<BaseTrial>> {
+        let mut sorted = rated.to_vec();
+        sorted.sort_by(|a, b| b.rating.score.total_cmp(&a.rating.score));
+        let mut found = self.places(local, &sorted, known);
+        found.truncate(self.n_places());
+        found
+    }
+
     fn group(
         &self,
         planes: &[InstallationPlane],
         local: &[Plane],
         trials: &[BaseTrial],
     ) -> Vec<Candidate> {
-        let mut places: Vec<Vec<BaseTrial>> = Vec::new();
-        for trial in trials.iter().filter(|t| t.rating.score >= self.min_score) {
-            let radius = self.settings.place_radius;
-            let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
-            let here = at(trial);
-            let same = places.iter().position(|p| (at(&p[0]) - here).norm() < radius);
-            match same {
-                Some(at) if places[at].len() < self.settings.bases_per_place => {
-                    places[at].push(*trial);
-                }
-                Some(_) => {}
-                None if places.len() < self.settings.max_places * self.n_cells() => {
-                    places.push(vec![*trial])
-                }
-                None => {}
-            }
-        }
-        places.iter_mut().for_each(|p| p.sort_by(|a, b| b.rating.score.total_cmp(&a.rating.score)));
-        places.retain_mut(|place| self.accept(local, place));
+        let places = self.places(local, trials, &mut PlausibleBases::default());
         let world_from_local = Pose::from_parts(
             Translation3::from(self.region.region.origin.coords),
             UnitQuaternion::identity(),
@@ -297,5 +364,35 @@ impl BaseSearch<'_> {
                     .collect(),
             })
             .collect()
+    }
+
+    /// Plausible trials by place, best first.
+    fn places(
+        &self,
+        local: &[Plane],
+        trials: &[BaseTrial],
+        known: &mut PlausibleBases,
+    ) -> Vec<Vec<BaseTrial>> {
+        let mut places: Vec<Vec<BaseTrial>> = Vec::new();
+        for trial in trials.iter().filter(|t| t.rating.score >= self.min_score) {
+            let radius = self.settings.place_radius;
+            let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
+            let here = at(trial);
+            let same = places.iter().position(|p| (at(&p[0]) - here).norm() < radius);
+            match same {
+                Some(at) if places[at].len() < self.settings.bases_per_place => {
+                    places[at].push(*trial);
+                }
+                Some(_) => {}
+                None if places.len() < self.settings.max_places * self.n_cells() => {
+                    places.push(vec![*trial])
+                }
+                None => {}
+            }
+        }
+        places.iter_mut().for_each(|p| p.sort_by(|a, b| b.rating.score.total_cmp(&a.rating.score)));
+        places.retain_mut(|place| self.accept(local, place, known));
+        places.sort_by(|a, b| b[0].rating.score.total_cmp(&a[0].rating.score));
+        places
     }
 }

@@ -1,6 +1,7 @@
 //! Trials, which are base poses under test, their scores, and how they are thinned out. Also the
 //! parts of a model that trials are scored by.
 
+use crate::score_grid::HIDDEN;
 use geometry::probe::HIDDEN_PRICE;
 use geometry::{Evidence, Pose, Probe};
 use robot::Model;
@@ -10,6 +11,8 @@ use std::f64::consts::TAU;
 /// Limit of base poses of one place. A cabinet that scores at any yaw must leave room for other
 /// places that fewer scans see.
 pub(crate) const QUOTA: usize = 16;
+/// The same once the first link is scored.
+pub(crate) const QUOTA_WITH_FIRST_LINK: usize = 6;
 /// Radius of such a place, metres. It is the same at all levels, since a place would split into
 /// many at the finest.
 const PLACE: f64 = 0.2;
@@ -46,6 +49,14 @@ impl SampleScore {
     /// The score of a probe whose mean score is known.
     pub(crate) fn of(probe: &Probe, score: f64) -> Self {
         Self { score, seen: f64::from(probe.seen()) }
+    }
+
+    /// Mean score of the judged samples, 1 at best; 0 where none was judged.
+    pub(crate) fn judged(&self) -> f64 {
+        if self.seen <= 0.0 {
+            return 0.0;
+        }
+        (self.score + f64::from(HIDDEN) * (1.0 - self.seen)) / self.seen
     }
 
     /// The value that trials are sorted by. It lies between the mean score of all samples, which
