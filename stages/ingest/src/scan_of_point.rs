@@ -63,7 +63,7 @@ mod tests {
         let scans: Vec<u16> = [0, 3, 11, 12, 19, 20, 29, 30, 39, 40].map(|p| places.of(p).0).into();
         assert_eq!(scans, [2, 0, 0, 1, 1, 2, 2, 0, 0, 2]);
         assert_eq!((places.of(4), places.of(20), places.of(99)), ((0, 11), (2, 29), (2, u64::MAX)));
-        assert!(places.are_all((3, 19)) == false && !places.are_all((0, 5)));
+        assert!(!places.are_all((3, 19)) && !places.are_all((0, 5)));
         assert!(PlacesOfScans::new(vec![(0, 4, 0), (5, 9, 1)], 2).are_all((0, 9)));
     }
 }
