@@ -85,7 +85,10 @@ mod tests {
         let failures = RegionFailures::of(&job(true));
         let none: Vec<u8> = failures.spare(&region, || panic!("a fault")).expect("forgiven");
         assert!(none.is_empty());
-        assert!(failures.spare(&region, || Err::<u8, _>(Error::new(Kind::Io, "disk"))).is_err());
+        let again: Vec<u8> = failures.spare(&region, || Ok(vec![1])).expect("left out");
+        assert!(again.is_empty());
+        let other = Region { origin: Point::new(9.0, 0.0, 0.0), ..region };
+        assert!(failures.spare(&other, || Err::<u8, _>(Error::new(Kind::Io, "disk"))).is_err());
         let said = failures.messages(&job(true));
         assert!(said.len() == 1 && said[0].contains("(4.0, 0.0, 0.0)"), "{said:?}");
         let strict = RegionFailures::of(&job(false));

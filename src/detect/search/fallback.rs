@@ -1,10 +1,9 @@
 //! Fallback passes of the search of a region, for robots that the plain search does not find: on
 //! walls and ceilings, behind other objects, on hidden stands, and robots that moved between scans.
 
+use super::extent::{SAME_BASE, SearchExtent, base, best_of_guesses, breadth};
 use super::tried::TriedBases;
-use super::{
-    MAX_SUNK, MIN_SHARE_OF_GUESS, SAME_BASE, Search, SearchExtent, base, best_of_place, breadth,
-};
+use super::{MAX_SUNK, Search};
 use crate::engine::AllThreads;
 use base_search::RegionEvidence;
 use contract::{Candidate, Fit, InstallationPlane, Region, Result, Verdict};
@@ -96,7 +95,8 @@ impl Search<'_, '_> {
         ] {
             let find = || {
                 let places = Some(MAX_MOUNTS);
-                let extent = SearchExtent { min_score: MIN_MOUNT_SCORE, breadth, places };
+                let (min_score, is_thorough) = (MIN_MOUNT_SCORE, false);
+                let extent = SearchExtent { min_score, breadth, places, is_thorough };
                 self.candidates(sight, &planes, extent)
             };
             let mut hung = self.piece(scene.region, &name, find)?;
@@ -134,14 +134,19 @@ impl Search<'_, '_> {
         tried: &mut TriedBases,
     ) -> Result<Vec<Fit>> {
         let Some(feet) = self.pass_over(scene, sight, fits) else { return Ok(Vec::new()) };
+        let plain = SearchExtent::plain(planes);
         let find = || {
             let breadth = BREADTH.max(breadth(planes));
-            let extent = SearchExtent { min_score: 0.0, breadth, places: Some(MAX_LEFT_OVER) };
+            let extent = SearchExtent { breadth, places: Some(MAX_LEFT_OVER), ..plain };
             self.candidates(sight, planes, extent)
         };
         let mut found = self.piece(scene.region, "left over", find)?;
         found.retain(|c| is_apart(c, &feet));
-        self.fits(scene, &likely(found, MAX_LEFT_OVER), tried)
+        let found = match plain.is_thorough {
+            true => few(found, MAX_LEFT_OVER),
+            false => likely(found, MAX_LEFT_OVER),
+        };
+        self.fits(scene, &found, tried)
     }
 
     /// Fits of robots whose feet hide their stands: where trusted robots leave many points
@@ -162,7 +167,8 @@ impl Search<'_, '_> {
         let planes = base_search::stand_planes(&region.world_bounds(), floor);
         let find = || {
             let (breadth, places) = (STAND_BREADTH, Some(MAX_MOUNTS));
-            let extent = SearchExtent { min_score: MIN_STAND_SCORE, breadth, places };
+            let (min_score, is_thorough) = (MIN_STAND_SCORE, false);
+            let extent = SearchExtent { min_score, breadth, places, is_thorough };
             self.candidates(sight, &planes, extent)
         };
         let mut found = self.piece(region, "stands", find)?;
@@ -202,8 +208,8 @@ impl Search<'_, '_> {
         if gone.len() < MIN_GONE {
             return Vec::new();
         }
-        let feet =
-            self.candidates(&sight.scan_by_scan(), scans.floors, SearchExtent::plain(scans.floors));
+        let extent = SearchExtent { is_thorough: true, ..SearchExtent::plain(scans.floors) };
+        let feet = self.candidates(&sight.scan_by_scan(), scans.floors, extent);
         let mut out: Vec<Fit> = Vec::new();
         let in_reach = |candidate: &&Candidate| {
             let here = base(&candidate.bases[0].0) - scans.region.origin.coords;
@@ -235,7 +241,7 @@ fn is_apart(candidate: &Candidate, feet: &[Point]) -> bool {
 /// The best candidates of each model, at most `most`, without those that others at their place
 /// leave far behind.
 fn likely(candidates: Vec<Candidate>, most: usize) -> Vec<Candidate> {
-    best_of_place(few(candidates, most), MIN_SHARE_OF_GUESS)
+    best_of_guesses(few(candidates, most))
 }
 
 /// The best candidates of each model, at most `most`.

@@ -1,8 +1,9 @@
 //! Search for a robot that a person expects: a model and a place near its base. The yaw and the
 //! height of the base are open. The place need not lie in a region of unexplained points.
 
+use super::extent::{GUESS_BREADTH, SAME_BASE, SearchExtent, base, breadth};
 use super::tried::TriedBases;
-use super::{GUESS_BREADTH, SAME_BASE, Search, SearchExtent, base, breadth, feet};
+use super::{Search, feet};
 use crate::detect::robots::{region, standing};
 use crate::engine::AllThreads;
 use base_search::RegionEvidence;
@@ -111,7 +112,7 @@ impl Search<'_, '_> {
         if planes.is_empty() {
             return Vec::new();
         }
-        let extent = SearchExtent { min_score: 0.0, breadth, places: None };
+        let extent = SearchExtent { min_score: 0.0, breadth, places: None, is_thorough: true };
         let mut found = self.candidates_of(hint.model, sight, planes, extent);
         found.retain(|c| {
             let pose = c.bases.first();

@@ -1,6 +1,7 @@
 //! The search of a region: reads the tiles that the region's views need, and sends every model of
 //! the library through base search and fit.
 
+mod extent;
 mod fallback;
 pub(crate) mod hint;
 mod tried;
@@ -15,6 +16,7 @@ use crate::job::{Method, Settings};
 use crate::store::Store;
 use base_search::{BaseSearch, RegionEvidence};
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
+use extent::{SAME_BASE, SPARE_PLACES, SearchExtent, base};
 use fit::{MeasuredScene, Prepared, ScansOfRegion};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use rayon::prelude::*;
@@ -82,21 +84,11 @@ const MAX_SUNK: f64 = 2.0;
 const BATCH: usize = 6;
 /// Distance from a base within which points are used to find it, metres: foot and shoulder.
 const FOOT: f64 = 1.5;
-/// Distance below which bases are at the same place, metres.
-const SAME_BASE: f64 = 0.35;
 /// Distance from the seen points of a robot at which its base may lie, metres.
 const FOOT_BESIDE: f64 = 0.3;
 /// Share of the score of a trusted robot's base below which another base at its place is not
 /// fitted.
 const FAR_WORSE: f64 = 0.7;
-/// Share of the best score of a base of any model at a place below which another model is not
-/// fitted there. Of 30 robots that were found the right model was the best at its place each time.
-const MIN_SHARE_OF_PLACE: f64 = 0.6;
-/// The same for robots that are not in plain view, where many places are tried.
-const MIN_SHARE_OF_GUESS: f64 = 0.75;
-/// Factor on the number of base poses where heights are guessed, since each place then occurs at
-/// many heights.
-const GUESS_BREADTH: usize = 8;
 
 impl<'a, 'm> Search<'a, 'm> {
     pub(crate) fn new(
@@ -185,7 +177,7 @@ impl<'a, 'm> Search<'a, 'm> {
         let find = || self.candidates(&sight, &planes, SearchExtent::plain(&planes));
         let mut candidates = self.piece(region, "candidates", find)?;
         candidates.retain(is_wanted);
-        let candidates = best_of_place(candidates, MIN_SHARE_OF_PLACE);
+        let candidates = extent::best_of_place(candidates, &planes);
         let mut tried = TriedBases::default();
         let mut fits = self.fits(&scene, &candidates, &mut tried)?;
         // Robots on the floor explain most regions; ceilings and walls are searched where there is
@@ -244,7 +236,7 @@ impl<'a, 'm> Search<'a, 'm> {
         planes: &[InstallationPlane],
         extent: SearchExtent,
     ) -> Vec<Candidate> {
-        let SearchExtent { min_score, breadth, places } = extent;
+        let SearchExtent { min_score, breadth, places, is_thorough } = extent;
         let guessed = planes.iter().all(InstallationPlane::is_guess);
         let model = &self.library.models[index];
         let search = BaseSearch::new(index, model, sight, &self.settings.base_search);
@@ -254,6 +246,7 @@ impl<'a, 'm> Search<'a, 'm> {
             Some(places) => s.with_places(places + SPARE_PLACES),
             None => s,
         });
+        let search = search.map(|s| if is_thorough { s.thoroughly() } else { s });
         search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
     }
 
@@ -402,46 +395,4 @@ fn feet(region: &Region, place: &Point, radius: f64) -> Region {
         bounds.max[i] = bounds.max[i].min(at[i] + reach);
     }
     Region { bounds, ..*region }
-}
-
-/// The candidates that score at least a share of the best one at their place, in their order.
-fn best_of_place(candidates: Vec<Candidate>, least: f64) -> Vec<Candidate> {
-    let best = |c: &Candidate| (base(&c.bases[0].0), c.bases[0].1);
-    let all: Vec<(Point, f64)> = candidates.iter().map(best).collect();
-    let is_among_best = |c: &Candidate| {
-        let (here, score) = best(c);
-        let near = all.iter().filter(|(at, _)| (at - here).norm() < SAME_BASE);
-        near.fold(score, |most, (_, other)| most.max(*other)) * least <= score
-    };
-    candidates.into_iter().filter(is_among_best).collect()
-}
-
-/// How far a search for bases goes.
-#[derive(Debug, Clone, Copy)]
-struct SearchExtent {
-    /// Least score of a base.
-    min_score: f64,
-    /// Factor on the number of base poses.
-    breadth: usize,
-    /// Number of places of each model that are wanted; `None`: as many as the region may hold.
-    places: Option<usize>,
-}
-
-/// Places that are searched beyond those that are wanted, since some may lie where none is wanted.
-const SPARE_PLACES: usize = 2;
-
-impl SearchExtent {
-    /// The extent of the plain search on some planes.
-    fn plain(planes: &[InstallationPlane]) -> Self {
-        Self { min_score: 0.0, breadth: breadth(planes), places: None }
-    }
-}
-
-/// Factor on the number of base poses for the planes of a region.
-fn breadth(planes: &[InstallationPlane]) -> usize {
-    if planes.iter().all(InstallationPlane::is_guess) { GUESS_BREADTH } else { 1 }
-}
-
-fn base(world_from_base: &Pose) -> Point {
-    world_from_base.translation.vector.into()
 }

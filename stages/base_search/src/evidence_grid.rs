@@ -14,12 +14,14 @@ use crate::score_grid::{SCORE_UNIT, ScoreGrid, UNJUDGED};
 pub(crate) const EDGE: f32 = 0.03;
 /// Limit of the cells; a larger region has larger ones.
 const MAX_CELLS: f64 = 16e6;
-/// Least tolerance that the grid serves, as a multiple of a cell's edge.
-pub(crate) const COARSE: f32 = 1.25;
+/// Least tolerance that the grid has scores for, as a multiple of a cell's edge.
+const LEAST: f32 = WIDE / RUNG;
+/// Tolerance from which on the rounding to cells hardly matters, as a multiple of a cell's edge.
+pub(crate) const WIDE: f32 = 1.4;
 /// Ratio of neighbouring tolerances that the grid has scores for. A twentieth more or less than the
 /// requested tolerance does not change which place is best.
 pub(crate) const RUNG: f32 = 1.1;
-const N_RUNGS: usize = 16;
+const N_RUNGS: usize = 17;
 /// Unit of the distances in a cell, metres.
 const UNIT: f32 = 0.004;
 /// In `distance`: no beam ended near. In `beyond`: beams went there and none returned.
@@ -102,11 +104,11 @@ impl EvidenceGrid {
     /// The scores at the available tolerance nearest to the requested one (metres); `None` if that
     /// is too fine for the grid.
     pub(crate) fn at_tolerance(&self, tolerance: f32) -> Option<ScoreGrid<'_>> {
-        let least = COARSE * self.edge;
-        if tolerance < least {
+        let least = LEAST * self.edge;
+        if tolerance * RUNG.sqrt() < least {
             return None;
         }
-        let rung = ((tolerance / least).ln() / RUNG.ln()).round() as usize;
+        let rung = ((tolerance / least).ln() / RUNG.ln()).round().max(0.0) as usize;
         let rung = rung.min(N_RUNGS - 1);
         let tolerance = least * RUNG.powi(rung as i32);
         let scores = self.scores[rung].get_or_init(|| self.score(tolerance));

@@ -154,7 +154,7 @@ impl BaseSearch<'_> {
         let (poses, quick_scores) = self.sweep(plane, &trial, first_link, tolerance);
         let mut best: Vec<usize> = (0..quick_scores.len()).collect();
         best.sort_by(|a, b| quick_scores[*b].total_cmp(&quick_scores[*a]));
-        let rating = |k: &usize| self.region.quick_score(samples, &poses[*k], tolerance);
+        let rating = |k: &usize| self.quick_score(samples, &poses[*k], tolerance);
         let first = highest(best.iter().take(N_QUICK_VALUES).map(rating));
         BaseTrial { rating: self.combined(trial.rating, first), first, ..trial }
     }
@@ -191,11 +191,7 @@ impl BaseSearch<'_> {
         let samples = Samples::first(self.model, first.link, self.settings.n_coarse / 4);
         let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
         let rating = |pose: &Pose| {
-            self.region.quick_score(
-                samples,
-                &(local_from_root * pose),
-                FIRST_LINK_REACH * tolerance,
-            )
+            self.quick_score(samples, &(local_from_root * pose), FIRST_LINK_REACH * tolerance)
         };
         highest(root_from_links.iter().map(rating))
     }
@@ -219,7 +215,7 @@ impl BaseSearch<'_> {
     ) -> (Vec<Pose>, Vec<f64>) {
         let poses = first.poses(&self.pose(plane, trial.x, trial.y, trial.yaw));
         let samples = Samples::first(self.model, first.link, self.settings.n_coarse / 4);
-        let score = |pose: &Pose| self.region.quick_score(samples, pose, tolerance).score;
+        let score = |pose: &Pose| self.quick_score(samples, pose, tolerance).score;
         let quick_scores = poses.iter().map(score).collect();
         (poses, quick_scores)
     }

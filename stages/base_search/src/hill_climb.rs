@@ -183,7 +183,7 @@ impl BaseSearch<'_> {
     ) -> SampleScore {
         let pose = self.pose(&planes[t.plane], t.x, t.y, t.yaw) * self.root_from_base;
         let samples = Samples::first(self.model, self.base, n_samples);
-        self.region.quick_score(samples, &pose, tolerance)
+        self.quick_score(samples, &pose, tolerance)
     }
 }
 

@@ -7,7 +7,7 @@ use robot::Model;
 
 use crate::first_link::FirstLink;
 use crate::region_evidence::RegionEvidence;
-use crate::settings::Settings;
+use crate::settings::{Settings, THOROUGH, THRIFTY, Thrift};
 use crate::trial::{BaseTrial, SampleScore, Samples, base_link};
 
 /// The search for one model's base in one region.
@@ -32,6 +32,8 @@ pub struct BaseSearch<'a> {
     pub(crate) min_score: f64,
     /// Factor on the number of base poses that are kept at each level.
     pub(crate) breadth: usize,
+    /// How much of the search space is left out.
+    pub(crate) thrift: Thrift,
     /// Number of places that are wanted, if not that of the settings.
     pub(crate) places: Option<usize>,
 }
@@ -76,6 +78,7 @@ impl<'a> BaseSearch<'a> {
             is_guess,
             min_score: settings.min_score,
             breadth: 1,
+            thrift: THRIFTY,
             places: None,
         })
     }
@@ -91,6 +94,12 @@ impl<'a> BaseSearch<'a> {
     #[must_use]
     pub fn with_breadth(self, breadth: usize) -> Self {
         Self { breadth, ..self }
+    }
+
+    /// The same search with less of the search space left out.
+    #[must_use]
+    pub fn thoroughly(self) -> Self {
+        Self { thrift: THOROUGH, ..self }
     }
 
     /// The same search for the best few places only.
@@ -117,6 +126,20 @@ impl<'a> BaseSearch<'a> {
         let samples = Samples::first(self.model, self.base, n_samples);
         let pose = self.pose(plane, trial.x, trial.y, trial.yaw) * self.root_from_base;
         self.region.rating(&samples.probe(self.region.evidence, &pose, tolerance))
+    }
+
+    /// Quick score of surface samples, to exclude most poses; `tolerance` in metres. A thorough
+    /// search looks at fine poses in the depth images themselves.
+    pub(crate) fn quick_score(
+        &self,
+        samples: Samples<'_>,
+        local_from_body: &Pose,
+        tolerance: f32,
+    ) -> SampleScore {
+        if self.thrift.is_best_first || self.region.is_coarse(tolerance) {
+            return self.region.quick_score(samples, local_from_body, tolerance);
+        }
+        self.region.rating(&samples.probe(self.region.evidence, local_from_body, tolerance))
     }
 
     /// The pose of the root link in the region's frame, for a base that stands on the plane at (x,

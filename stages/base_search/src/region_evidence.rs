@@ -5,9 +5,9 @@ use contract::{Fan, Region, View};
 use geometry::probe::HIDDEN_PRICE;
 use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 
-use crate::evidence_grid::{COARSE, EDGE, EvidenceGrid, RUNG};
-use crate::score_grid::{HIDDEN, ScoreGrid, Stencil};
-use crate::trial::{SampleScore, Samples};
+use crate::evidence_grid::{EDGE, EvidenceGrid, RUNG, WIDE};
+use crate::score_grid::{ScoreGrid, Stencil};
+use crate::trial::{HIDDEN, SampleScore, Samples};
 
 /// The points of a small cube.
 #[derive(Debug, Clone, Copy)]
@@ -93,6 +93,12 @@ impl<'a> RegionEvidence<'a> {
         }
     }
 
+    /// Whether a tolerance (metres) is so much wider than a cell of the grid that its rounding does
+    /// not matter.
+    pub(crate) fn is_coarse(&self, tolerance: f32) -> bool {
+        self.grid.as_ref().is_none_or(|grid| tolerance >= WIDE * grid.edge)
+    }
+
     /// Samples of a body at a pose that it is then shifted from, for many quick scores; `None` if
     /// the grid does not serve the tolerance (metres).
     pub(crate) fn stencil(
@@ -110,7 +116,7 @@ impl<'a> RegionEvidence<'a> {
 
     /// The tolerance itself, or the least one of the grid if that is slightly larger; metres.
     pub(crate) fn grid_tolerance(&self, tolerance: f32) -> f32 {
-        let least = self.grid.as_ref().map_or(0.0, |grid| COARSE * grid.edge);
+        let least = self.grid.as_ref().map_or(0.0, |grid| WIDE * grid.edge);
         if tolerance * RUNG >= least { tolerance.max(least) } else { tolerance }
     }
 

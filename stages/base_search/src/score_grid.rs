@@ -1,19 +1,15 @@
 //! A grid of scores, in which the mean score of a body's samples at a pose takes one look-up and
 //! one integer addition a sample.
 
-use crate::trial::SampleScore;
+use crate::trial::{HIDDEN, SampleScore};
 use geometry::Pose;
 use geometry::depth::{Rows, rows, transform};
 
 /// Unit of the scores in a grid. The price of a hidden sample is two units, that of a sample that a
 /// beam passed through is a hundred.
-pub(crate) const SCORE_UNIT: f32 = 0.015;
+pub(crate) const SCORE_UNIT: f32 = HIDDEN / -(UNJUDGED as f32);
 /// Score of a cell that no beam could judge. No other cell has this score.
 pub(crate) const UNJUDGED: i8 = -2;
-/// Price of a sample of a base that no beam could judge. Scanned from two sides, under an arm, nine
-/// samples in ten are hidden.
-pub(crate) const HIDDEN: f32 = UNJUDGED as f32 * -SCORE_UNIT;
-
 /// The scores of the cells of a region at one tolerance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ScoreGrid<'a> {

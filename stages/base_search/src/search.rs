@@ -14,9 +14,7 @@ use crate::hill_climb::SearchLevel;
 use crate::problem::BaseSearch;
 use crate::regions::{GUESS_STEP, are_stacked};
 use crate::score_grid::Stencil;
-use crate::trial::{
-    BaseTrial, QUOTA, QUOTA_WITH_FIRST_LINK, SampleScore, Samples, Thinning, best, coarse_yaw,
-};
+use crate::trial::{BaseTrial, SampleScore, Samples, Thinning, best, coarse_yaw};
 
 /// Heights above a plane of the points that may belong to a base, metres: above the plane itself,
 /// and not above a robot's shoulder.
@@ -27,11 +25,6 @@ const SURROUND_SHARE: f64 = 0.8;
 const MIN_CELLS: usize = 3;
 /// Fewest points of a filled cell.
 const MIN_IN_CELL: u32 = 3;
-/// Quick score (on a quarter of the samples, best of every other yaw) below which a place is
-/// dropped.
-const MIN_QUICK_SCORE: f64 = -0.05;
-/// Difference from the best quick score of a place up to which a yaw is scored with all samples.
-const YAW_LAG: f64 = 0.25;
 /// Largest stride between guessed planes at the coarse level: the next levels try two planes up and
 /// down, and then one.
 const MAX_STRIDE: usize = 6;
@@ -42,9 +35,8 @@ const COARSE_REACH: f64 = 1.3;
 const MIN_SHARE_COARSE: f64 = 0.4;
 /// Share of the least score that a base must reach at the middle level.
 const MIN_SHARE_MIDDLE: f64 = 0.6;
-/// Least mean score of the judged samples of a base on a coarse grid. The smallest value of 49
-/// robots that were found is 0.60.
-const MIN_JUDGED_COARSE: f64 = 0.5;
+/// Limit of base poses of one place before the first link is scored.
+const FEET_OF_A_PLACE: usize = 16;
 /// Number of trials that are refined to the finest level at once.
 const FINE_BATCH: usize = 16;
 /// Number of poses of a place that are rated to compare places.
@@ -60,7 +52,7 @@ impl BaseSearch<'_> {
     #[must_use]
     pub fn run(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> Vec<Candidate> {
         let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
-        let mut trials = Vec::new();
+        let (thrift, mut trials) = (self.thrift, Vec::new());
         for at in self.coarse_planes(&local) {
             trials.extend(self.coarse(at, &planes[at], &local[at], fan));
         }
@@ -69,7 +61,7 @@ impl BaseSearch<'_> {
         let cells = self.breadth * self.n_cells();
         let thinning = Thinning {
             keep: self.settings.keep_feet * cells,
-            quota: QUOTA,
+            quota: FEET_OF_A_PLACE,
             step: step * 0.9,
             yaw_step: yaw_step * 0.9,
         };
@@ -82,8 +74,8 @@ impl BaseSearch<'_> {
         best(
             &mut trials,
             Thinning {
-                keep: self.settings.keep_coarse * cells,
-                quota: QUOTA_WITH_FIRST_LINK,
+                keep: thrift.keep * self.settings.keep_coarse * cells,
+                quota: thrift.quota,
                 ..thinning
             },
         );
@@ -92,8 +84,8 @@ impl BaseSearch<'_> {
             step: step / 2.0,
             yaw: yaw_step / 2.0,
             rise: 2,
-            keep: self.settings.keep_middle * cells,
-            quota: QUOTA_WITH_FIRST_LINK,
+            keep: thrift.keep * self.settings.keep_middle * cells,
+            quota: thrift.quota,
         };
         let mut trials = self.refine_level(&local, &trials, &middle, fan);
         self.drop_low_scores(&mut trials, MIN_SHARE_MIDDLE);
@@ -105,7 +97,10 @@ impl BaseSearch<'_> {
             keep: self.settings.max_places * cells * per_place,
             quota: per_place,
         };
-        let trials = self.refine_best_first(&local, &trials, &fine, fan);
+        let trials = match thrift.is_best_first {
+            true => self.refine_best_first(&local, &trials, &fine, fan),
+            false => self.refine_level(&local, &trials, &fine, fan),
+        };
         self.group(planes, &local, &trials)
     }
 
@@ -124,8 +119,7 @@ impl BaseSearch<'_> {
 
     /// Whether a score on a coarse grid leaves room for a plausible base (`accept`).
     fn may_be_plausible(&self, rating: &SampleScore) -> bool {
-        let is_judged = self.region.evidence.has_beams() && self.region.by_scan.is_empty();
-        !is_judged || rating.judged() >= MIN_JUDGED_COARSE
+        !self.region.evidence.has_beams() || rating.judged() >= self.thrift.min_judged
     }
 
     /// Number of robots that the region may hold, at least one. It scales the number of places that
@@ -196,18 +190,19 @@ impl BaseSearch<'_> {
                     let mut pose = turned(k);
                     pose.translation.vector += shift;
                     let samples = Samples::first(self.model, self.base, n_samples);
-                    self.region.quick_score(samples, &pose, tolerance)
+                    self.quick_score(samples, &pose, tolerance)
                 })
             };
             // Few samples at every other yaw exclude most places, and most yaws of the others.
             let few: Vec<f64> =
                 (0..n).step_by(2).map(|k| look_up(k, self.settings.n_coarse / 4).score).collect();
             let top = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
-            if top < MIN_QUICK_SCORE {
+            if top < self.thrift.min_quick_score {
                 return Vec::new();
             }
             let is_near_top = |k: usize| {
-                few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()]) >= top - YAW_LAG
+                few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()])
+                    >= top - self.thrift.yaw_lag
             };
             let all = (0..n).filter(|k| is_near_top(*k)).filter_map(|k| {
                 let rating = look_up(k, self.settings.n_coarse);

@@ -1,20 +1,18 @@
 //! Trials, which are base poses under test, their scores, and how they are thinned out. Also the
 //! parts of a model that trials are scored by.
 
-use crate::score_grid::HIDDEN;
 use geometry::probe::HIDDEN_PRICE;
 use geometry::{Evidence, Pose, Probe};
 use robot::Model;
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
-/// Limit of base poses of one place. A cabinet that scores at any yaw must leave room for other
-/// places that fewer scans see.
-pub(crate) const QUOTA: usize = 16;
-/// The same once the first link is scored.
-pub(crate) const QUOTA_WITH_FIRST_LINK: usize = 6;
-/// Radius of such a place, metres. It is the same at all levels, since a place would split into
-/// many at the finest.
+/// Price of a sample of a base that no beam could judge. Scanned from two sides, under an arm, nine
+/// samples in ten are hidden.
+pub(crate) const HIDDEN: f32 = 0.03;
+
+/// Radius of a place of which the number of base poses is limited, metres. It is the same at all
+/// levels, since a place would split into many at the finest.
 const PLACE: f64 = 0.2;
 
 /// Difference from the best quick score (on a quarter of the samples) up to which a pose is scored

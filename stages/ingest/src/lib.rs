@@ -44,6 +44,7 @@ mod laz;
 mod levels;
 mod looked;
 mod map;
+mod new_scan;
 mod oddities;
 mod picture;
 mod place_look;

@@ -6,7 +6,7 @@ use crate::file::OpenFile;
 use crate::format::detect;
 use crate::las::Las;
 use crate::looked::{InputLooks, KeepLooks, KeepNone};
-use crate::place_look;
+use crate::new_scan::new_scan;
 use crate::poses::Poses;
 use crate::raster::StepSource;
 use crate::reader::{self, Extent, FileReading, Reader, Want};
@@ -15,8 +15,8 @@ use crate::scanners::{KnownScanner, KnownScanners};
 use crate::settings::Settings;
 use crate::units::{Choice, ReferenceSystem, Units};
 use contract::{
-    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScanId, ScannerPosition,
-    Strip, Weigh,
+    Error, Fan, Format, Input, InputId, Kind, Mask, MaskId, Result, Scan, ScannerPosition, Strip,
+    Weigh,
 };
 use std::path::{Path, PathBuf};
 
@@ -316,7 +316,8 @@ impl Sources {
         self.files.push(file);
     }
 
-    /// Numbers masks and scans of an input; `scanner` gives the scanner that the user states for a scan.
+    /// Numbers masks and scans of an input; `scanner` gives the scanner that the user states for a
+    /// scan.
     fn take<'a>(
         &mut self,
         path: PathBuf,
@@ -339,7 +340,7 @@ impl Sources {
         let spreads = Vec::new();
         let mut file = OpenFile { reader, first_scan, first_mask, moved, known, steps, spreads };
         for i in 0..file.reader.scans().len() {
-            let scan = scan_of(id, &mut file, i, &mut scanner);
+            let scan = new_scan(id, &mut file, i, &mut scanner);
             self.scans.push(scan);
         }
         file
@@ -393,46 +394,6 @@ impl Sources {
         }
         Ok(())
     }
-}
-
-/// A scan of a file, still without lattice. LAS poses are in the file's own scans already.
-fn scan_of<'a>(
-    input: InputId,
-    file: &mut OpenFile,
-    i: usize,
-    scanner: &mut impl FnMut(&str) -> Option<&'a KnownScanner>,
-) -> Scan {
-    let seed = &file.reader.scans()[i];
-    let mut scan = Scan {
-        id: ScanId(file.first_scan + i as u32),
-        input,
-        mask: MaskId(file.first_mask + seed.mask as u32),
-        name: seed.name.clone(),
-        source_id: seed.source_id,
-        places: seed.places.clone(),
-        scanner: seed.position,
-        world_from_scan: seed.world_from_scan,
-        lattice: None,
-        stated_bounds: seed.stated_bounds,
-        stated_points: seed.stated_points,
-        notes: seed.notes.clone(),
-    };
-    let replaced = match file.reader.format() {
-        Format::Las | Format::Laz | Format::Memory => None,
-        Format::E57 | Format::Ptx => scanner(&seed.name),
-    };
-    file.known.push(seed.scanner_known || replaced.is_some());
-    let moved = |known: &KnownScanner| known.world_from_scan.inverse() * seed.world_from_scan;
-    file.moved.push(replaced.map(moved));
-    if let Some(known) = replaced {
-        scan.world_from_scan = known.world_from_scan;
-        scan.scanner = known.position();
-        scan.notes.push(match scan.scanner {
-            ScannerPosition::Found { sigma } => place_look::found_note(sigma),
-            _ => "the scanner's position is that of --scanners, not of the file".into(),
-        });
-    }
-    scan
 }
 
 impl Weigh for InputPiece {
