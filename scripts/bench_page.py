@@ -476,6 +476,30 @@ def table_shift():
     return table(head, rows)
 
 
+def say_found_scanners():
+    rows = Family("found_scanners").last()
+    invented = sum(int(r["invented"]) for r in rows)
+    ordered = [r for r in rows if int(r["found"])]
+    found, setups = (sum(int(r[k]) for r in ordered) for k in ("found", "setups"))
+    return [
+        f"In files that keep the order of measurement {found} of {setups} setups are found, half of them to "
+        f"{max(float(r['error_median_mm']) for r in ordered):.3f} mm; {invented} are invented in all."
+    ]
+
+
+def table_found_scanners():
+    head = ["order of the points", "setups", "found", "invented", "error, median mm", "95 %", "worst"]
+    head += ["error by deviation, median", "95 %", "points of another setup, %", "s a cloud"]
+    keys = ["order", "setups", "found", "invented", "error_median_mm", "error_95_mm", "error_worst_mm"]
+    keys += ["by_sigma_median", "by_sigma_95", "points_wrong_percent", "seconds"]
+    return table(head, [[r[k] for k in keys] for r in Family("found_scanners").last()])
+
+
+def table_base_search():
+    head = ["pass", "before, ms", "after, ms"]
+    return table(head, [[r["pass"], r["ms_before"], r["ms_after"]] for r in Family("base_search").last()])
+
+
 def say_paths():
     rows = Family("paths").last()
     n, free = (sum(int(r[k] or 0) for r in rows) for k in ("colliding", "colliding_called_free"))

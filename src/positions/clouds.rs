@@ -19,8 +19,9 @@ const PER_SETUP: usize = 60;
 /// Share of windows without a setup above which more are read.
 const UNEXPLAINED: f64 = 0.1;
 /// Largest standard deviation of a position that is used, metres: free space is judged to a few
-/// millimetres.
-const MOST_SIGMA: f64 = 0.005;
+/// millimetres. Right combs of scanners state less than a millimetre; of 744 drawn setups one was
+/// wrong, by 24 mm at a stated 4.6 mm.
+const MOST_SIGMA: f64 = 0.002;
 
 /// What was found in a cloud: a scan whose scanner the file does not state.
 #[derive(Debug, Clone, Serialize)]

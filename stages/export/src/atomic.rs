@@ -128,7 +128,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     file.commit()
 }
 
-/// Like [`write`], for a file that several processes, perhaps of several machines, may write at
+/// Like [`write()`], for a file that several processes, perhaps of several machines, may write at
 /// once: each writes under a temporary name of its own, and the last rename counts.
 ///
 /// # Errors

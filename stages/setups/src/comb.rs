@@ -31,6 +31,10 @@ const AGAIN: usize = 2;
 /// Coherence from which on the other way to count sides is not tried.
 const PLAIN: f64 = 0.8;
 
+/// Factor on standard deviations for errors that columns and elevations share. Without it 95 % of the
+/// errors of 744 drawn setups lay within 2.7 to 3.0 deviations instead of 2.0.
+const UNMODELLED: f64 = 1.5;
+
 /// How the sides of the axis are told apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sides {
@@ -134,7 +138,7 @@ fn fitted(
     let mut pose = fit.pose;
     pose.translation.vector += origin;
     // Points that were counted to the wrong row pull, and their pulls are not independent.
-    let doubt = 1.0 / evidence.coherence.max(0.1).powi(2);
+    let doubt = UNMODELLED / evidence.coherence.max(0.1).powi(2);
     let sigma = [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt() * doubt);
     let by_direction = sides == Sides::Rising;
     let world_from_scanner = pose;
