@@ -31,8 +31,8 @@ const AGAIN: usize = 2;
 /// Coherence from which on the other way to count sides is not tried.
 const PLAIN: f64 = 0.8;
 
-/// Factor on standard deviations for errors that columns and elevations share. Without it 95 % of the
-/// errors of 744 drawn setups lay within 2.7 to 3.0 deviations instead of 2.0.
+/// Factor on standard deviations for errors that columns and elevations share. Without it 95 % of
+/// the errors of 744 drawn setups lay within 2.7 to 3.0 deviations instead of 2.0.
 const UNMODELLED: f64 = 1.5;
 
 /// How the sides of the axis are told apart.
