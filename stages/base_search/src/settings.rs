@@ -59,7 +59,7 @@ pub(crate) struct Thrift {
     pub(crate) is_best_first: bool,
 }
 
-/// Scanners: of 49 robots that were found none had a judged score below 0.60 on a coarse grid.
+/// Scanners: at 96 places of trusted fits no judged score on a coarse grid was below 0.596.
 pub(crate) const THRIFTY: Thrift = Thrift {
     min_quick_score: -0.05,
     yaw_lag: 0.25,
