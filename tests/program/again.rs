@@ -1,9 +1,8 @@
 //! Runs that come again, from outside: what is there is used, what is damaged is made anew, and
 //! runs that are killed go on.
 
-use crate::common::palletiser;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use crate::common::{files, palletiser};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
@@ -27,24 +26,6 @@ fn run(dir: &Path, out: &str, more: &[&str]) -> Output {
 
 fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// Every file of a result, by its name.
-fn files(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    let mut folders = vec![out.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() && !path.ends_with("store") {
-                folders.push(path);
-            } else if path.is_file() {
-                let name = path.strip_prefix(out).expect("below").to_path_buf();
-                all.insert(name, std::fs::read(&path).expect("a file"));
-            }
-        }
-    }
-    all
 }
 
 fn same(a: &Path, b: &Path) {

@@ -1,10 +1,9 @@
 //! A job in shards, from outside: many processes with one store make the same bytes as one run,
 //! whatever the order, also where two make the same shard and where some are killed.
 
-use crate::common::cell_of_files;
+use crate::common::{cell_of_files, files};
 use serde_json::Value;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -31,24 +30,6 @@ fn done(mut command: Command) -> Output {
 
 fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// Every file of a result, by its name.
-fn files(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    let mut folders = vec![out.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(&folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() && !path.ends_with("store") {
-                folders.push(path);
-            } else if path.is_file() {
-                let name = path.strip_prefix(out).expect("below").to_path_buf();
-                all.insert(name, std::fs::read(&path).expect("a file"));
-            }
-        }
-    }
-    all
 }
 
 fn same(a: &Path, b: &Path) {

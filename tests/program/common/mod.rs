@@ -1,7 +1,8 @@
 //! What several tests run on: a small scene, its scans and its library of one model.
 
 use simulate::scene::Cuboid;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use stillpoint::engine::Engine;
 use stillpoint::eval::demo::write_robots;
 use stillpoint::eval::virtual_scan::{Formats, scan_scene};
@@ -75,4 +76,22 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
             std::fs::copy(&path, &place).expect("copies");
         }
     }
+}
+
+/// Every file of a result, by its name.
+pub(crate) fn files(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    let mut folders = vec![out.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() && !path.ends_with("store") {
+                folders.push(path);
+            } else if path.is_file() {
+                let name = path.strip_prefix(out).expect("below").to_path_buf();
+                all.insert(name, std::fs::read(&path).expect("a file"));
+            }
+        }
+    }
+    all
 }
