@@ -8,6 +8,9 @@ use geometry::{Point, Pose};
 const MIN_SHARE_OF_PLACE: f64 = 0.6;
 /// The same for robots that are not in plain view, where many places are tried.
 const MIN_SHARE_OF_GUESS: f64 = 0.75;
+/// Share of the best score of a base of any model in the neighbourhood below which a base is not
+/// looked at more closely than at the coarse level.
+pub(super) const MIN_SHARE_COARSE: f64 = 0.6;
 /// Factor on the number of base poses where heights are guessed, since each place then occurs at
 /// many heights.
 pub(super) const GUESS_BREADTH: usize = 8;

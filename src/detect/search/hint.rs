@@ -113,7 +113,8 @@ impl Search<'_, '_> {
             return Vec::new();
         }
         let extent = SearchExtent { min_score: 0.0, breadth, places: None, is_thorough: true };
-        let mut found = self.candidates_of(hint.model, sight, planes, extent);
+        let search = self.search_of(hint.model, sight, planes, extent);
+        let mut found = search.map(|s| s.run(planes, &AllThreads)).unwrap_or_default();
         found.retain(|c| {
             let pose = c.bases.first();
             pose.is_some_and(|pose| (base(&pose.0) - hint.at).norm() <= hint.radius)

@@ -14,9 +14,9 @@ use crate::engine::AllThreads;
 use crate::engine::progress::Pieces;
 use crate::job::{Method, Settings};
 use crate::store::Store;
-use base_search::{BaseSearch, RegionEvidence};
+use base_search::{BaseSearch, CoarseBases, RegionEvidence};
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
-use extent::{SAME_BASE, SPARE_PLACES, SearchExtent, base};
+use extent::{MIN_SHARE_COARSE, SAME_BASE, SPARE_PLACES, SearchExtent, base};
 use fit::{MeasuredScene, Prepared, ScansOfRegion};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use rayon::prelude::*;
@@ -207,47 +207,57 @@ impl<'a, 'm> Search<'a, 'm> {
         robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
-    /// Candidates of all models on some planes, best base first.
+    /// Candidates of all models on some planes, best base first. Between the coarse level and the
+    /// others, models are dropped at places where others score far higher.
     fn candidates(
         &self,
         sight: &RegionEvidence<'_>,
         planes: &[InstallationPlane],
         extent: SearchExtent,
     ) -> Vec<Candidate> {
-        let search = |index: usize| {
-            let found = self.candidates_of(index, sight, planes, extent);
-            self.pieces.done();
-            found
+        let n = self.library.models.len();
+        self.pieces.expect(n);
+        let models = (0..n).into_par_iter();
+        let searches: Vec<Option<BaseSearch<'_>>> =
+            models.map(|index| self.search_of(index, sight, planes, extent)).collect();
+        let coarse = |search: &Option<BaseSearch<'_>>| {
+            search.as_ref().map(|s| s.coarse_bases(planes, &AllThreads)).unwrap_or_default()
         };
-        self.pieces.expect(self.library.models.len());
-        let models = (0..self.library.models.len()).into_par_iter();
-        let found: Vec<Vec<Candidate>> = models.map(search).collect();
+        let mut bases: Vec<CoarseBases> = searches.par_iter().map(coarse).collect();
+        if !extent.is_thorough {
+            base_search::drop_outscored(&mut bases, MIN_SHARE_COARSE);
+        }
+        let refined = |(search, coarse): (&Option<BaseSearch<'_>>, &CoarseBases)| {
+            let found = search.as_ref().map(|s| s.refine(planes, coarse, &AllThreads));
+            self.pieces.done();
+            found.unwrap_or_default()
+        };
+        let found: Vec<Vec<Candidate>> = searches.par_iter().zip(&bases).map(refined).collect();
         let mut out: Vec<Candidate> =
             found.into_iter().flatten().filter(|c| !c.bases.is_empty()).collect();
         out.sort_by(|a, b| b.bases[0].1.total_cmp(&a.bases[0].1).then(a.model.cmp(&b.model)));
         out
     }
 
-    /// The same of one model, in the order of the base search.
-    fn candidates_of(
-        &self,
+    /// The search for the bases of one model; `None` for tools.
+    fn search_of<'s>(
+        &'s self,
         index: usize,
-        sight: &RegionEvidence<'_>,
+        sight: &'s RegionEvidence<'s>,
         planes: &[InstallationPlane],
         extent: SearchExtent,
-    ) -> Vec<Candidate> {
+    ) -> Option<BaseSearch<'s>> {
         let SearchExtent { min_score, breadth, places, is_thorough } = extent;
         let guessed = planes.iter().all(InstallationPlane::is_guess);
         let model = &self.library.models[index];
-        let search = BaseSearch::new(index, model, sight, &self.settings.base_search);
-        let search = search.map(|s| if guessed { s.on_guessed_planes() } else { s });
-        let search = search.map(|s| s.with_min_score(min_score).with_breadth(breadth));
-        let search = search.map(|s| match places {
-            Some(places) => s.with_places(places + SPARE_PLACES),
-            None => s,
-        });
-        let search = search.map(|s| if is_thorough { s.thoroughly() } else { s });
-        search.map(|search| search.run(planes, &AllThreads)).unwrap_or_default()
+        let search = BaseSearch::new(index, model, sight, &self.settings.base_search)?;
+        let search = if guessed { search.on_guessed_planes() } else { search };
+        let search = search.with_min_score(min_score).with_breadth(breadth);
+        let search = match places {
+            Some(places) => search.with_places(places + SPARE_PLACES),
+            None => search,
+        };
+        Some(if is_thorough { search.thoroughly() } else { search })
     }
 
     /// Fits of candidates, which are sorted by the score of their base. Where a robot is trusted,

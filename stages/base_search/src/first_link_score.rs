@@ -30,7 +30,7 @@ const N_QUICK_VALUES: usize = 6;
 /// Number of likely values of the first joint that are kept while a base is moved.
 const N_LIKELY: usize = 3;
 /// Tolerance of the first link as a multiple of the base's: its joint has steps, too.
-const FIRST_LINK_REACH: f32 = 1.5;
+pub(crate) const FIRST_LINK_REACH: f32 = 1.5;
 
 /// Which bases are plausible, as far as it was asked: places are judged again after each batch.
 #[derive(Debug, Default)]
@@ -138,8 +138,8 @@ impl BaseSearch<'_> {
         BaseTrial { rating: self.combined(of_base, first), first, ..trial }
     }
 
-    /// Like [`Self::with_first_link`], but with quick scores and the score that the base has
-    /// already.
+    /// Like [`Self::with_first_link`], but with quick scores, the score that the base has already,
+    /// and the tolerance of the link itself, metres.
     pub(crate) fn quick_with_first_link(
         &self,
         plane: &Plane,

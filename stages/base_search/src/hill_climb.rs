@@ -5,6 +5,7 @@ use contract::Fan;
 use geometry::{Plane, Pose};
 use std::collections::HashMap;
 
+use crate::first_link_score::FIRST_LINK_REACH;
 use crate::problem::BaseSearch;
 use crate::regions::are_stacked;
 use crate::trial::{BaseTrial, MAX_LAG, SampleScore, Samples, Thinning, best};
@@ -34,6 +35,8 @@ pub(crate) struct SearchLevel {
     pub(crate) keep: usize,
     /// Limit of these at one place.
     pub(crate) quota: usize,
+    /// Whether quick scores are enough to choose the poses for the next level.
+    pub(crate) is_quick: bool,
 }
 
 impl SearchLevel {
@@ -95,7 +98,15 @@ impl BaseSearch<'_> {
             yaw_step: level.yaw * 0.6,
         };
         best(&mut trials, Thinning { keep: 2 * kept.keep, quota: 2 * kept.quota, ..kept });
-        let mut out = fan.fan(trials, |t| self.with_first_link(&planes[t.plane], t, tolerance));
+        let rated = |t: BaseTrial| match level.is_quick {
+            true => {
+                let rating = self.look(planes, &t, self.settings.n_fine, tolerance);
+                let trial = BaseTrial { rating, ..t };
+                self.quick_with_first_link(&planes[t.plane], trial, FIRST_LINK_REACH * tolerance)
+            }
+            false => self.with_first_link(&planes[t.plane], t, tolerance),
+        };
+        let mut out = fan.fan(trials, rated);
         best(&mut out, kept);
         out
     }
@@ -114,7 +125,11 @@ impl BaseSearch<'_> {
         let mut about = |middle: ClimbSteps| -> Vec<(ClimbSteps, BaseTrial)> {
             let heights = if self.is_guess { -1..2 } else { 0..1 };
             let all = heights.flat_map(|height| (0..27).map(move |n| (height, n)));
-            let near = all.filter_map(|(height, n)| {
+            // A thrifty climb changes its height alone.
+            let is_tried = |(height, n): &(isize, isize)| {
+                *height == 0 || *n == 13 || self.thrift.climbs_aslant
+            };
+            let near = all.filter(is_tried).filter_map(|(height, n)| {
                 let by = [height, n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
                 let steps = [0, 1, 2, 3].map(|i| middle[i] + by[i]);
                 let find = || self.moved_by(planes, start, level, steps);

@@ -14,6 +14,7 @@ mod evidence_grid;
 mod first_link;
 mod first_link_score;
 mod hill_climb;
+mod outscored;
 mod problem;
 mod region_evidence;
 mod regions;
@@ -22,6 +23,7 @@ mod search;
 mod settings;
 mod trial;
 
+pub use outscored::{CoarseBases, drop_outscored};
 pub use problem::BaseSearch;
 pub use region_evidence::RegionEvidence;
 pub use regions::{guessed_planes, level_planes, raised_planes, regions, stand_planes};

@@ -3,7 +3,7 @@
 
 use crate::trial::{HIDDEN, SampleScore};
 use geometry::Pose;
-use geometry::depth::{Rows, rows, transform};
+use geometry::depth::{LANES, Lanes, Rows, lanes, rows, transform, transform_lanes};
 
 /// Unit of the scores in a grid. The price of a hidden sample is two units, that of a sample that a
 /// beam passed through is a hundred.
@@ -49,13 +49,30 @@ impl<'a> ScoreGrid<'a> {
     /// grid are hidden.
     pub(crate) fn look_up(&self, points: &[[f32; 3]], local_from_body: &Pose) -> SampleScore {
         let m = self.cells_from(local_from_body);
-        let score = |p: &[f32; 3]| {
-            let at = transform(&m, *p);
-            let is_inside = (0..3).all(|i| at[i] >= 0.0 && at[i] < self.n[i] as f32);
-            let place = || self.place(at.map(|v| v as i32)) as usize;
-            if is_inside { self.scores[place()] } else { UNJUDGED }
-        };
-        rating(points.iter().map(score), points.len())
+        let some = points.chunks(LANES).flat_map(|some| {
+            let places = self.places_of(&transform_lanes(&m, &lanes(some)));
+            let score = |place: i32| self.scores.get(place as usize).copied().unwrap_or(UNJUDGED);
+            places.map(score).into_iter().take(some.len())
+        });
+        rating(some, points.len())
+    }
+
+    /// Indices of cells; -1 outside of the grid. The loop has no branches, so that it is
+    /// vectorised.
+    #[inline]
+    fn places_of(&self, cells: &Lanes) -> [i32; LANES] {
+        let mut out = [-1; LANES];
+        let [x, y, z] = cells;
+        let n = self.n.map(|n| n as f32);
+        for i in 0..LANES {
+            let is_inside = (x[i] >= 0.0) & (y[i] >= 0.0) & (z[i] >= 0.0);
+            let is_inside = is_inside & (x[i] < n[0]) & (y[i] < n[1]) & (z[i] < n[2]);
+            // Far outside the index would overflow.
+            let cell = |v: f32, n: f32| v.clamp(0.0, n) as i32;
+            let place = self.place([cell(x[i], n[0]), cell(y[i], n[1]), cell(z[i], n[2])]);
+            out[i] = if is_inside { place } else { -1 };
+        }
+        out
     }
 
     /// The samples of a body at the pose that it is then shifted from.

@@ -11,6 +11,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 
 use crate::first_link_score::PlausibleBases;
 use crate::hill_climb::SearchLevel;
+use crate::outscored::CoarseBases;
 use crate::problem::BaseSearch;
 use crate::regions::{GUESS_STEP, are_stacked};
 use crate::score_grid::Stencil;
@@ -51,19 +52,23 @@ impl BaseSearch<'_> {
     /// each place, best first.
     #[must_use]
     pub fn run(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> Vec<Candidate> {
-        let local: Vec<Plane> = planes.iter().map(|p| self.to_local(&p.plane)).collect();
+        self.refine(planes, &self.coarse_bases(planes, fan), fan)
+    }
+
+    /// The coarse level of the search: base poses with their scores.
+    #[must_use]
+    pub fn coarse_bases(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> CoarseBases {
+        let local = self.all_local(planes);
         let (thrift, mut trials) = (self.thrift, Vec::new());
         for at in self.coarse_planes(&local) {
             trials.extend(self.coarse(at, &planes[at], &local[at], fan));
         }
-        let step = self.coarse_step();
-        let yaw_step = coarse_yaw();
         let cells = self.breadth * self.n_cells();
         let thinning = Thinning {
             keep: self.settings.keep_feet * cells,
             quota: FEET_OF_A_PLACE,
-            step: step * 0.9,
-            yaw_step: yaw_step * 0.9,
+            step: self.coarse_step() * 0.9,
+            yaw_step: coarse_yaw() * 0.9,
         };
         best(&mut trials, thinning);
         // Large parts of a cell have the height of a base. The first link excludes them sooner than
@@ -80,14 +85,33 @@ impl BaseSearch<'_> {
             },
         );
         self.drop_low_scores(&mut trials, MIN_SHARE_COARSE);
+        let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
+        let places = trials.iter().map(at).collect();
+        CoarseBases { trials, places }
+    }
+
+    /// Refines base poses of the coarse level on the same planes, and returns the candidates, one
+    /// for each place, best first.
+    #[must_use]
+    pub fn refine(
+        &self,
+        planes: &[InstallationPlane],
+        coarse: &CoarseBases,
+        fan: &dyn Fan,
+    ) -> Vec<Candidate> {
+        let local = self.all_local(planes);
+        let thrift = self.thrift;
+        let (step, yaw_step) = (self.coarse_step(), coarse_yaw());
+        let cells = self.breadth * self.n_cells();
         let middle = SearchLevel {
             step: step / 2.0,
             yaw: yaw_step / 2.0,
             rise: 2,
             keep: thrift.keep * self.settings.keep_middle * cells,
             quota: thrift.quota,
+            is_quick: thrift.is_best_first,
         };
-        let mut trials = self.refine_level(&local, &trials, &middle, fan);
+        let mut trials = self.refine_level(&local, &coarse.trials, &middle, fan);
         self.drop_low_scores(&mut trials, MIN_SHARE_MIDDLE);
         let per_place = self.settings.bases_per_place;
         let fine = SearchLevel {
@@ -96,12 +120,17 @@ impl BaseSearch<'_> {
             rise: 1,
             keep: self.settings.max_places * cells * per_place,
             quota: per_place,
+            is_quick: false,
         };
         let trials = match thrift.is_best_first {
             true => self.refine_best_first(&local, &trials, &fine, fan),
             false => self.refine_level(&local, &trials, &fine, fan),
         };
         self.group(planes, &local, &trials)
+    }
+
+    fn all_local(&self, planes: &[InstallationPlane]) -> Vec<Plane> {
+        planes.iter().map(|p| self.to_local(&p.plane)).collect()
     }
 
     /// Drops trials that score less than a share of the least score, and those that no finer level

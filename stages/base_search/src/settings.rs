@@ -55,6 +55,8 @@ pub(crate) struct Thrift {
     pub(crate) quota: usize,
     /// Factor on the number of base poses that are kept.
     pub(crate) keep: usize,
+    /// Whether a climb changes height and place in one step.
+    pub(crate) climbs_aslant: bool,
     /// Whether the finest level is searched best first, and ends where the wanted places are found.
     pub(crate) is_best_first: bool,
 }
@@ -66,6 +68,7 @@ pub(crate) const THRIFTY: Thrift = Thrift {
     min_judged: 0.5,
     quota: 6,
     keep: 1,
+    climbs_aslant: false,
     is_best_first: true,
 };
 
@@ -77,6 +80,7 @@ pub(crate) const THOROUGH: Thrift = Thrift {
     min_judged: f64::NEG_INFINITY,
     quota: 16,
     keep: 2,
+    climbs_aslant: true,
     is_best_first: false,
 };
 

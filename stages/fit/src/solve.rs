@@ -48,17 +48,23 @@ struct HopelessScore {
 }
 
 const HOPELESS_SCORE: HopelessScore = HopelessScore { scanner: 0.45, camera: 0.25, points: 0.1 };
-/// Score of a base from which on the full search is made at once.
+/// Score of a base from which on the full search is made at once where points or a depth camera's
+/// beams tell.
 const CLEAR_BASE: f64 = 0.35;
+/// Score after a quick look from which on the full search is made at once. Of 46 robots that were
+/// found none had less than 0.678; of 230 wrong places four had more than 0.66.
+const CLEAR_LOOK: f64 = 0.66;
 /// Hypotheses of a quick look.
 struct QuickLook {
     /// Kept at each joint.
     beam: usize,
     settled: usize,
     refined: usize,
+    /// Samples of a link where beams of scanners tell.
+    samples: usize,
 }
 
-const QUICK: QuickLook = QuickLook { beam: 25, settled: 8, refined: 3 };
+const QUICK: QuickLook = QuickLook { beam: 25, settled: 8, refined: 3, samples: 60 };
 
 /// One point of so many of the last adjustment is enough to choose what it is made of, where that
 /// is more than links have at least.
@@ -92,7 +98,8 @@ pub fn fit(
     let prior = Some(Prior::of(candidate, &local_from_world, settings));
     let plain = Problem::new(prepared, scene, settings, fan).with_points(&nearby);
     let problem = Problem { prior, ..plain };
-    let is_clear = candidate.bases.first().is_some_and(|b| b.1 >= CLEAR_BASE);
+    let is_clear =
+        !is_by_scanners(scene) && candidate.bases.first().is_some_and(|base| base.1 >= CLEAR_BASE);
     if !is_clear && !is_promising(&problem, &bases) {
         return None;
     }
@@ -176,10 +183,21 @@ fn is_reported(judgement: &Judgement, settings: &Settings) -> bool {
 }
 
 /// Whether anything like the robot's arm stands on one of the bases. A right one may end with a
-/// wrong wrist in a quick look, but not without shoulder and elbow.
+/// wrong wrist in a quick look, but not without shoulder and elbow; what is no clear match must at
+/// least lie on the points, as all 46 robots that were found did, and 3 of 230 wrong places.
 fn is_promising(problem: &Problem<'_>, bases: &[Pose]) -> bool {
-    let found = quick(problem, bases);
-    found.is_some_and(|found| found.judgement.score >= hopeless(problem.scene))
+    let Some(found) = quick(problem, bases) else { return false };
+    let (score, scene) = (found.judgement.score, problem.scene);
+    if score < hopeless(scene) {
+        return false;
+    }
+    let is_clear = !is_by_scanners(scene) || score >= CLEAR_LOOK;
+    is_clear || !is_lost(&settle(problem, &found.hypothesis).adjusted, scene)
+}
+
+/// Whether beams of scanners alone judge a scene.
+fn is_by_scanners(scene: &MeasuredScene<'_>) -> bool {
+    scene.evidence.has_beams() && !scene.has_camera()
 }
 
 fn hopeless(scene: &MeasuredScene<'_>) -> f64 {
@@ -192,7 +210,9 @@ fn hopeless(scene: &MeasuredScene<'_>) -> f64 {
 
 /// A quick look with few hypotheses: the best posture.
 pub(crate) fn quick(problem: &Problem<'_>, bases: &[Pose]) -> Option<Refined> {
+    let most = if is_by_scanners(problem.scene) { QUICK.samples } else { usize::MAX };
     let settings = Settings {
+        n_search: problem.settings.n_search.min(most),
         beam: QUICK.beam,
         settle: QUICK.settled,
         n_refine: QUICK.refined,
