@@ -8,7 +8,7 @@ const WINDOW: usize = 1 << 13;
 /// Distance between the places from which decompression can start, bytes.
 const APART: u64 = 4 << 20;
 /// Number of bytes that are decompressed ahead.
-const AHEAD: usize = 1 << 16;
+pub(super) const AHEAD: usize = 1 << 16;
 
 /// A place from which decompression can start.
 #[derive(Debug, Clone)]
@@ -96,6 +96,7 @@ impl<'a> LzfStream<'a> {
     }
 
     /// The next `n` bytes; at most [`AHEAD`].
+    #[inline]
     pub(super) fn take(&mut self, n: usize) -> Result<&[u8]> {
         self.forget();
         while self.buffer.len() - self.used < n {
@@ -144,9 +145,14 @@ impl<'a> LzfStream<'a> {
                 "a copy of compressed points reaches before the first, \"{back}\""
             )));
         };
-        // A copy may reach into itself.
-        for i in from..from + len + 2 {
-            self.buffer.push(self.buffer[i]);
+        let len = len + 2;
+        if back >= len {
+            self.buffer.extend_from_within(from..from + len);
+        } else {
+            // The copy reaches into itself.
+            for i in from..from + len {
+                self.buffer.push(self.buffer[i]);
+            }
         }
         self.at = at + 1;
         Ok(true)

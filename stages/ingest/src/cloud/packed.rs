@@ -3,7 +3,7 @@
 use super::binary::{BinarySlot, Scalar};
 use super::body::too_short;
 use super::fields::Slots;
-use super::lzf::{LzfIndex, LzfStream};
+use super::lzf::{AHEAD, LzfIndex, LzfStream};
 use contract::{Error, Result};
 
 /// Number of records that are decompressed at once.
@@ -70,12 +70,14 @@ impl PackedStreams<'_> {
     /// Appends up to `n` records, of which there are as many.
     pub(super) fn more(&mut self, n: usize, out: &mut Vec<Slots>) -> Result<()> {
         let from = out.len();
-        let n = n.min(AT_ONCE);
+        let longest = self.streams.iter().map(|(_, slot)| slot.stride).max().unwrap_or(1);
+        let n = n.min(AT_ONCE).min(AHEAD / longest).max(1);
         out.resize(from + n, Slots::default());
         for (stream, slot) in &mut self.streams {
             let scalar: Scalar = slot.scalar;
-            for record in &mut out[from..] {
-                record[slot.slot] = scalar.value(stream.take(slot.stride)?, false);
+            let values = stream.take(slot.stride * n)?.chunks_exact(slot.stride);
+            for (record, value) in out[from..].iter_mut().zip(values) {
+                record[slot.slot] = scalar.value(value, false);
             }
         }
         Ok(())

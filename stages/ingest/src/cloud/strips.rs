@@ -16,11 +16,12 @@ impl CloudFile {
         want: Want,
     ) -> Result<Vec<RawStrip>> {
         let part = &self.parts[scan];
+        let n = self.strip_points.min(records.size_hint().1.unwrap_or(0));
         let empty = || RawStrip {
             scan,
             first_place: 0,
-            place: Vec::new(),
-            xyz: Vec::new(),
+            place: Vec::with_capacity(n),
+            xyz: Vec::with_capacity(n),
             attributes: (want == Want::Everything).then(Attributes::default),
         };
         let (mut out, mut strip) = (Vec::new(), empty());

@@ -388,3 +388,32 @@ fn no_damage_panics_or_moves_other_points() {
     }
     assert!(n_refused > 100 && n_read > 100, "{n_refused} {n_read}");
 }
+
+/// Processor time of this thread on Linux, seconds, whatever runs beside it.
+fn processor_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
+    stat.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).expect("a number") / 1e9
+}
+
+/// A measurement, not a test: `cargo test --release -p ingest --lib -- --ignored --nocapture rate`.
+#[test]
+#[ignore = "a measurement"]
+#[allow(clippy::print_stdout)] // it prints what it measures
+fn rates_of_one_thread() {
+    let points = cloud(8);
+    let points: Vec<Written> = points.iter().cycle().take(2_000_000).copied().collect();
+    for (name, bytes) in every_format(&points) {
+        let file = ScratchFile::new(&format!("rate-{name}"), &bytes);
+        let format = crate::format::detect(&file.0).expect("known");
+        let start = processor_seconds();
+        let reader = open(&file.0, format, &Settings::default()).expect("valid");
+        let opened = processor_seconds() - start;
+        let strips = crate::reader::strips(&*reader, Want::Everything).expect("valid");
+        let n: usize = strips.map(|strip| strip.expect("valid").xyz.len()).sum();
+        let all = processor_seconds() - start;
+        println!(
+            "{name}: {:.1} M points a second of processor time, opened in {opened:.3} s",
+            n as f64 / all / 1e6
+        );
+    }
+}

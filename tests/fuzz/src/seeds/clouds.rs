@@ -47,7 +47,9 @@ pub(super) fn put(seeds: &Seeds, scratch: &Path) {
 /// Lists of points: text, PLY and PCD.
 fn lists(seeds: &Seeds) {
     let lines = |between: &str| -> String {
-        (0..6).map(|i| [i % 3, i / 3, 2, 9, 50, 60, 70].map(|v| v.to_string()).join(between) + "\n").collect()
+        (0..6)
+            .map(|i| [i % 3, i / 3, 2, 9, 50, 60, 70].map(|v| v.to_string()).join(between) + "\n")
+            .collect()
     };
     let spaced = lines(" ");
     seeds.put("cloud", "pts", format!("6\n{spaced}6\n{spaced}"));
@@ -71,9 +73,13 @@ fn lists(seeds: &Seeds) {
     seeds.put("cloud", "pcd", [pcd("binary").into_bytes(), floats.clone()].concat());
     // Literals only: each is at most 32 bytes long.
     let packed: Vec<u8> =
-        floats.chunks(32).flat_map(|c| [&[c.len() as u8 - 1], c].concat()).collect();
+        floats.chunks(32).flat_map(|c| [&[c.len() as u8 - 1][..], c].concat()).collect();
     let sizes = [packed.len() as u32, floats.len() as u32].map(u32::to_le_bytes).concat();
-    seeds.put("cloud", "pcd-packed", [pcd("binary_compressed").into_bytes(), sizes, packed].concat());
+    seeds.put(
+        "cloud",
+        "pcd-packed",
+        [pcd("binary_compressed").into_bytes(), sizes, packed].concat(),
+    );
 }
 
 fn las(format: u8, compressed: bool, extra: u16) -> Option<Vec<u8>> {
