@@ -100,7 +100,7 @@ pub(super) struct DemoFlags {
 
 #[derive(Debug, Args)]
 pub(super) struct InspectFlags {
-    /// Scan files: E57, PTX, LAS, LAZ
+    /// Scan files: E57, PTX, LAS, LAZ, PTS, XYZ, PLY, PCD
     #[arg(required = true, value_name = "INPUT")]
     pub(super) inputs: Vec<PathBuf>,
     /// Print JSON
@@ -110,7 +110,7 @@ pub(super) struct InspectFlags {
 
 #[derive(Debug, Args)]
 pub(super) struct RunFlags {
-    /// Scan files: E57, PTX, LAS, LAZ
+    /// Scan files: E57, PTX, LAS, LAZ, PTS, XYZ, PLY, PCD
     #[arg(required = true, value_name = "INPUT")]
     pub(super) inputs: Vec<PathBuf>,
     /// Robot library: a folder with one subfolder per model, each with robot.urdf and its meshes
@@ -173,7 +173,7 @@ pub(super) struct RescanFlags {
     /// Output folder of the earlier run or rescan
     #[arg(long, value_name = "OUT")]
     pub(super) base: PathBuf,
-    /// New scans of the cell: E57, PTX, LAS, LAZ
+    /// New scans of the cell: E57, PTX, LAS, LAZ, PTS, XYZ, PLY, PCD
     #[arg(required = true, value_name = "INPUT")]
     pub(super) inputs: Vec<PathBuf>,
     /// Output folder; unchanged files are shared with the earlier result

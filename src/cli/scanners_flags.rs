@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct ScannersFlags {
-    /// Scan files: E57, PTX, LAS, LAZ
+    /// Scan files: E57, PTX, LAS, LAZ, PTS, XYZ, PLY, PCD
     #[arg(required = true, value_name = "INPUT")]
     pub(super) inputs: Vec<PathBuf>,
     /// Write the positions that were found to this file (TOML), for --scanners

@@ -12,11 +12,15 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Number of points that are decoded of an input, by format: about a second of one thread.
-const DECODED: [(Format, u64); 4] = [
+const DECODED: [(Format, u64); 8] = [
     (Format::E57, 20_000_000),
     (Format::Las, 20_000_000),
     (Format::Laz, 3_000_000),
     (Format::Ptx, 6_000_000),
+    (Format::Pts, 3_000_000),
+    (Format::Xyz, 3_000_000),
+    (Format::Ply, 5_000_000),
+    (Format::Pcd, 5_000_000),
 ];
 /// Number of sampled points of all inputs: some twenty per surface voxel in a hall of 20 m x 20 m.
 const KEPT: u64 = 3_000_000;

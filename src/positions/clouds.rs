@@ -99,7 +99,7 @@ fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
     let stem = stem(&input.path);
     let name = match input.format {
         Format::Las | Format::Laz => stem.clone(),
-        Format::E57 | Format::Ptx | Format::Memory => scan.name.clone(),
+        _ => scan.name.clone(),
     };
     let setups = found.setups.iter().zip(owned);
     let setups: Vec<SetupOfCloud> =

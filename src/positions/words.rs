@@ -21,7 +21,7 @@ pub(super) fn unknown(found: &FoundSetups, is_alone: bool, n_usable: usize) -> O
     const NAME: &str =
         "several inputs have its name, so that no scanners file can mean it: rename the files";
     const MIXED: &str = "it is open which points are those of which scanner, or a position is too uncertain; a \
-         merged E57 file can be used if it is written as LAS in its order";
+         merged file of another format can be used if it is written as LAS in its order";
     if !found.setups.is_empty() && !is_alone {
         return Some(NAME.to_owned());
     }

@@ -308,6 +308,10 @@ fn format_word(format: Format) -> &'static str {
         Format::Ptx => "ptx",
         Format::Las => "las",
         Format::Laz => "laz",
+        Format::Pts => "pts",
+        Format::Xyz => "xyz",
+        Format::Ply => "ply",
+        Format::Pcd => "pcd",
         Format::Memory => "memory",
     }
 }

@@ -179,6 +179,74 @@ fn points_without_ids_are_told_apart_by_their_places() {
     assert_eq!(n_known.count(), 3, "{scans}");
 }
 
+/// World points of the records of a scan of the hall, in their order.
+fn points_of(dir: &Path, source: u16) -> Vec<[f64; 3]> {
+    let bytes = std::fs::read(dir.join("scans/scans.las")).expect("reads");
+    let start = u32::from_le_bytes(bytes[96..100].try_into().expect("four")) as usize;
+    let len = usize::from(u16::from_le_bytes(bytes[105..107].try_into().expect("two")));
+    let float = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight"));
+    let world = |record: &[u8]| {
+        [0, 1, 2].map(|a| {
+            let steps = i32::from_le_bytes(record[4 * a..4 * a + 4].try_into().expect("four"));
+            f64::from(steps) * float(131 + 8 * a) + float(155 + 8 * a)
+        })
+    };
+    let is_own = |record: &&[u8]| u16::from_le_bytes([record[20], record[21]]) == source;
+    bytes[start..].chunks_exact(len).filter(is_own).map(world).collect()
+}
+
+#[test]
+fn lists_of_points_in_their_order_give_their_scanners() {
+    let dir = hall();
+    let at = dir.path();
+    let scans = [1, 2, 3].map(|source| points_of(at, source));
+    let lines = |points: &[[f64; 3]], between: &str| -> String {
+        let line = |p: &[f64; 3]| p.map(|v| format!("{v:.4}")).join(between) + "\n";
+        points.iter().map(line).collect()
+    };
+    let pts = |points: &[[f64; 3]]| format!("{}\n{}", points.len(), lines(points, " "));
+    std::fs::write(at.join("hall.pts"), scans.iter().map(|p| pts(p)).collect::<String>())
+        .expect("writes");
+    let csv = format!("x;y;z\n{}", lines(&scans[0], ";"));
+    std::fs::write(at.join("one.csv"), csv).expect("writes");
+    let n = scans[1].len();
+    let xyz = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n";
+    let head = format!("VERSION 0.7\n{xyz}WIDTH {n}\nHEIGHT 1\nPOINTS {n}\nDATA binary\n");
+    let floats = scans[1].iter().flatten().flat_map(|v| (*v as f32).to_le_bytes());
+    let pcd: Vec<u8> = head.bytes().chain(floats).collect();
+    std::fs::write(at.join("two.pcd"), pcd).expect("writes");
+    let found = stillpoint(at, &["scanners", "hall.pts", "--json"]);
+    assert_eq!(found.status.code(), Some(0), "{}", String::from_utf8_lossy(&found.stderr));
+    let of_blocks: Vec<Value> = json(&found)["clouds"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .flat_map(|cloud| cloud["setups"].as_array().expect("a list").clone())
+        .collect();
+    assert_found(&Value::from(of_blocks), at);
+    let seen = stillpoint(
+        at,
+        &["inspect", "hall.pts", "one.csv", "two.pcd", "--scanners", "auto", "--json"],
+    );
+    assert_eq!(seen.status.code(), Some(0), "{}", String::from_utf8_lossy(&seen.stderr));
+    let inputs = json(&seen)["inputs"].as_array().expect("a list").clone();
+    let scans: Vec<&Value> =
+        inputs.iter().flat_map(|input| input["scans"].as_array().expect("a list")).collect();
+    assert_eq!(scans.len(), 5);
+    assert!(scans.iter().all(|s| s["scanner_known"] == true && s["lattice"].is_object()));
+    // All setups in one list: found, but no scanners file can tell their points apart.
+    let unified = lines(&points_all(at), " ");
+    std::fs::write(at.join("all.xyz"), unified).expect("writes");
+    let found = json(&stillpoint(at, &["scanners", "all.xyz", "--json"]))["clouds"][0].clone();
+    assert_found(&found["setups"], at);
+    assert!(found["setups"].as_array().expect("a list").iter().all(|s| s["is_usable"] == false));
+    assert!(found["unknown"].as_str().is_some_and(|cause| cause.contains("written as LAS")));
+}
+
+fn points_all(dir: &Path) -> Vec<[f64; 3]> {
+    [1, 2, 3].into_iter().flat_map(|source| points_of(dir, source)).collect()
+}
+
 #[test]
 fn a_shuffled_cloud_is_unknown_with_its_cause() {
     let dir = hall();

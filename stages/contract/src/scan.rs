@@ -26,6 +26,14 @@ pub enum Format {
     Las,
     /// Compressed LAS.
     Laz,
+    /// Text: a count, then a line a point, once or several times.
+    Pts,
+    /// Text of one line a point, with or without names of columns (XYZ, CSV, TXT, ASC).
+    Xyz,
+    /// PLY, whose vertices are the points.
+    Ply,
+    /// PCD of the Point Cloud Library.
+    Pcd,
     /// No file: arrays in memory that another program handed over.
     Memory,
 }

@@ -45,6 +45,17 @@ impl FileFrame {
         Self { rotation: None, shift: [0.0; 3], world_from_scan, scanner_known: true, no_return }
     }
 
+    /// The frame of a scanner with this pose, for a file whose points are in the world.
+    pub(crate) fn of_world(world_from_scan: Pose) -> Self {
+        let scan_from_world = world_from_scan.inverse();
+        let turned = scan_from_world.rotation.angle() > 0.0;
+        Self {
+            rotation: turned.then_some(scan_from_world.rotation),
+            shift: (-scan_from_world.translation.vector).into(),
+            ..Self::of_scanner(world_from_scan)
+        }
+    }
+
     /// A frame with world axes and an origin at whole metres near `near` (a point in the file
     /// frame), for points whose scanner is unknown.
     pub(crate) fn about(world_from_file: Pose, near: [f64; 3]) -> Self {
@@ -150,6 +161,9 @@ mod tests {
             let back = frame.world_from_scan * Point::from(frame.scan_from_file(p));
             assert!((back - world).norm() < 1e-8, "{back} {world}");
         }
+        let of_world = FileFrame::of_world(pose);
+        let back = of_world.world_from_scan * Point::from(of_world.scan_from_file(p));
+        assert!((back.coords - Vector3::from(p)).norm() < 1e-8 && of_world.scanner_known);
         let about = FileFrame::about(pose, [300.0, -40.0, 5.0]);
         assert!(Vector3::from(about.scan_from_file(p)).norm() < 20.0);
         assert_eq!(about.world_from_scan.rotation, UnitQuaternion::identity());

@@ -192,6 +192,10 @@ fn word(format: Format) -> &'static str {
         Format::Ptx => "PTX",
         Format::Las => "LAS",
         Format::Laz => "LAZ",
+        Format::Pts => "PTS",
+        Format::Xyz => "XYZ",
+        Format::Ply => "PLY",
+        Format::Pcd => "PCD",
         Format::Memory => "memory",
     }
 }

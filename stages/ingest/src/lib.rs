@@ -1,4 +1,4 @@
-//! Reads point files (E57, PTX, LAS, LAZ) as strips of points. No other crate knows these formats,
+//! Reads point files (E57, PTX, LAS, LAZ, PTS, text, PLY, PCD) as strips of points. No other crate knows these formats,
 //! and this crate knows nothing of what the points show.
 //!
 //! # Example
@@ -28,6 +28,7 @@ mod arrays;
 mod bounds;
 #[cfg(test)]
 mod check;
+mod cloud;
 mod e57;
 mod file;
 mod format;

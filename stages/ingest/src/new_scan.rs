@@ -29,7 +29,7 @@ pub(crate) fn new_scan<'a>(
     };
     let replaced = match file.reader.format() {
         Format::Las | Format::Laz | Format::Memory => None,
-        Format::E57 | Format::Ptx => scanner(&seed.name),
+        _ => scanner(&seed.name),
     };
     file.known.push(seed.scanner_known || replaced.is_some());
     let moved = |known: &KnownScanner| known.world_from_scan.inverse() * seed.world_from_scan;

@@ -417,6 +417,9 @@ fn open_file(path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<
         Format::E57 => crate::e57::open(path, settings),
         Format::Ptx => crate::ptx::open(path, settings),
         Format::Las | Format::Laz => Ok(Box::new(Las::open(path, &poses.of_las(path), settings)?)),
+        format @ (Format::Pts | Format::Xyz | Format::Ply | Format::Pcd) => {
+            crate::cloud::open(path, format, settings)
+        }
         Format::Memory => Err(Error::new(Kind::Bug, "a file was taken for memory")),
     }
 }

@@ -118,8 +118,17 @@ pub(crate) fn numbers(line: &[u8], out: &mut [f64]) -> std::result::Result<usize
     }
 }
 
+/// The number that a word is.
+#[inline]
+pub(crate) fn number(word: &[u8]) -> Option<f64> {
+    match plain(word) {
+        Some((value, len)) if len == word.len() => Some(value),
+        _ => std::str::from_utf8(word).ok()?.parse().ok(),
+    }
+}
+
 /// A word for a message: shortened and printable.
-fn shown(word: &[u8]) -> String {
+pub(crate) fn shown(word: &[u8]) -> String {
     quote::shown(&String::from_utf8_lossy(&word[..word.len().min(40)])).into_owned()
 }
 
@@ -193,9 +202,12 @@ mod tests {
         }
     }
 
-    fn number(word: &str) -> Option<f64> {
+    fn of_word(word: &str) -> Option<f64> {
         let mut out = [0.0];
-        (numbers(word.as_bytes(), &mut out) == Ok(1)).then_some(out[0])
+        let of_line = (numbers(word.as_bytes(), &mut out) == Ok(1)).then_some(out[0]);
+        let alone = number(word.as_bytes());
+        assert_eq!(of_line.map(f64::to_bits), alone.map(f64::to_bits), "{word}");
+        alone
     }
 
     #[test]
@@ -218,11 +230,11 @@ mod tests {
             "000000000000000000001",
         ] {
             let want: f64 = word.parse().expect("a number");
-            assert_eq!(number(word).map(f64::to_bits), Some(want.to_bits()), "{word}");
+            assert_eq!(of_word(word).map(f64::to_bits), Some(want.to_bits()), "{word}");
         }
-        assert!(number("nan").is_some_and(f64::is_nan));
+        assert!(of_word("nan").is_some_and(f64::is_nan));
         for word in ["", "-", ".", "1,5", "1.2.3", "x", "--1", "1\u{a0}2"] {
-            assert_eq!(number(word), None, "{word}");
+            assert_eq!(of_word(word), None, "{word}");
         }
     }
 

@@ -222,11 +222,12 @@ fn what_is_no_scan_is_refused_by_name() {
     let settings = Settings::default();
     for (name, bytes, words) in [
         ("empty.las", &b""[..], "empty"),
-        ("x.ply", b"ply\nformat ascii 1.0\n", "PLY is not read; export"),
+        ("x.ply", b"ply\nformat ascii 1.0\n", "header does not end"),
+        ("x.pcd", b"nonsense", "the name ends in \"pcd\""),
+        ("notes.txt", b"scanned on Monday\n", "does not begin with points"),
         ("x.las", b"nonsense", "the name ends in \"las\""),
         ("x.zip", b"PK\x03\x04", "archive"),
         ("x.rcp", b"\x00\x01", "ReCap"),
-        ("cloud.xyz", b"1 2 3\n4 5 6\n", "without scanner positions"),
     ] {
         let path = write(folder.path(), name, bytes);
         let error = open(&[path], None, &settings, &OneByOne).err().expect(name).to_string();

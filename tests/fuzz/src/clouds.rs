@@ -27,6 +27,11 @@ pub fn ptx(data: &[u8]) {
     read(&file("case.ptx", data));
 }
 
+/// PTS, plain text, PLY and PCD, told apart by their beginning.
+pub fn cloud(data: &[u8]) {
+    read(&file("case.xyz", data));
+}
+
 /// Bytes of a page, and of its payload.
 const PAGE: usize = 1024;
 const PAYLOAD: usize = 1020;

@@ -88,7 +88,7 @@ def run(
     Parameters
     ----------
     inputs
-        Scan files: E57, PTX, LAS, LAZ.
+        Scan files: E57, PTX, LAS, LAZ, PTS, XYZ, PLY, PCD.
     robots
         Robot library: a folder with one folder per model, each with ``robot.urdf`` and its meshes.
     out
@@ -163,7 +163,7 @@ def rescan(
     Parameters
     ----------
     inputs
-        New scans of the cell: E57, PTX, LAS, LAZ.
+        New scans of the cell: E57, PTX, LAS, LAZ, PTS, XYZ, PLY, PCD.
     base
         The earlier result, or its folder.
     out

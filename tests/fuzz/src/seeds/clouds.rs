@@ -41,6 +41,45 @@ pub(super) fn put(seeds: &Seeds, scratch: &Path) {
     seeds.put("ptx", "two", all.concat());
     seeds.put("ptx", "gap", ptx(" 0.5").replace("1 0 0.5 0.5", "0 0 0 0.5"));
     seeds.put_all("ptx", all);
+    lists(seeds);
+}
+
+/// Lists of points: text, PLY and PCD.
+fn lists(seeds: &Seeds) {
+    let lines = |between: &str| -> String {
+        (0..6)
+            .map(|i| [i % 3, i / 3, 2, 9, 50, 60, 70].map(|v| v.to_string()).join(between) + "\n")
+            .collect()
+    };
+    let spaced = lines(" ");
+    seeds.put("cloud", "pts", format!("6\n{spaced}6\n{spaced}"));
+    seeds.put("cloud", "csv", format!("x,y,z,intensity,red,green,blue\n{}", lines(",")));
+    seeds.put("cloud", "named", format!("//X;Y;Z;I;R;G;B\n{}", lines(";")));
+    let floats: Vec<u8> = (0..18_u8).flat_map(|i| f32::from(i % 5).to_le_bytes()).collect();
+    let ply = |encoding: &str| {
+        let xyz = "property float x\nproperty float y\nproperty float z\n";
+        format!("ply\nformat {encoding} 1.0\nelement vertex 6\n{xyz}end_header\n")
+    };
+    seeds.put("cloud", "ply-ascii", format!("{}{}", ply("ascii"), "1 2 3\n".repeat(6)));
+    seeds.put("cloud", "ply", [ply("binary_little_endian").into_bytes(), floats.clone()].concat());
+    seeds.put("cloud", "ply-big", [ply("binary_big_endian").into_bytes(), floats.clone()].concat());
+    let pcd = |encoding: &str| {
+        format!(
+            "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 6\nHEIGHT 1\n\
+             VIEWPOINT 1 2 3 1 0 0 0\nPOINTS 6\nDATA {encoding}\n"
+        )
+    };
+    seeds.put("cloud", "pcd-ascii", format!("{}{}", pcd("ascii"), "1 2 3\n".repeat(6)));
+    seeds.put("cloud", "pcd", [pcd("binary").into_bytes(), floats.clone()].concat());
+    // Literals only: each is at most 32 bytes long.
+    let packed: Vec<u8> =
+        floats.chunks(32).flat_map(|c| [&[c.len() as u8 - 1][..], c].concat()).collect();
+    let sizes = [packed.len() as u32, floats.len() as u32].map(u32::to_le_bytes).concat();
+    seeds.put(
+        "cloud",
+        "pcd-packed",
+        [pcd("binary_compressed").into_bytes(), sizes, packed].concat(),
+    );
 }
 
 fn las(format: u8, compressed: bool, extra: u16) -> Option<Vec<u8>> {
