@@ -10,9 +10,9 @@ scanned twice with the same beams: with noise, mixed pixels and lost beams, and 
 The noisy scans are run and exported as mesh, with the default bound and with 50,000 triangles.
 
 A true point is where a beam without error ends on a thing that stands still. Its beam *met* it if
-the noisy scan has it within three standard deviations of its place; other beams were lost, mixed, or slid along a
-grazing face, and are counted apart. Prints one line of CSV for each mesh. Needs numpy, open3d and
-pye57.
+the noisy scan has it within three standard deviations of its place; other beams were lost, mixed,
+or slid along a grazing face, and are counted apart. Prints one line of CSV for each mesh. Needs
+numpy, open3d and pye57.
 """
 
 import argparse
@@ -250,4 +250,5 @@ def main():
         cell(args, k, writer)
 
 
-main()
+if __name__ == "__main__":
+    main()

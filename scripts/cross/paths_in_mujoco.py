@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 
 # Largest step between compared postures, radians or metres.
-STEP = 0.005
+STEP = 0.02
 # Most paths drawn for each that is wanted.
 DRAWS = 12
 MARGIN = 0.02
@@ -101,18 +101,22 @@ class Plant:
             if pair not in self.touching:
                 yield pair, -contact.dist
 
-    def follow(self, driven):
-        """Moves followers, and joints of loops until their pins meet."""
+    def follow(self, own, driven):
+        """Moves followers of one robot, and joints of its loops until their pins meet."""
         model, qpos = self.model, self.qpos
-        loose = []
+        loose = set()
         for e in range(model.neq):
             if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT:
                 line = model.eq_data[e, :2]
                 to, of = (model.jnt_qposadr[j] for j in (model.eq_obj1id[e], model.eq_obj2id[e]))
-                qpos[to] = line[0] + line[1] * qpos[of]
-                loose.append(to)
+                if of in own:
+                    qpos[to] = line[0] + line[1] * qpos[of]
+                    loose.add(to)
         pins = [e for e in range(model.neq) if model.eq_type[e] == mujoco.mjtEq.mjEQ_CONNECT]
-        free = [at for at in range(model.nq) if at not in driven and at not in loose]
+        moved = {model.jnt_bodyid[j] for j in range(model.njnt) if model.jnt_qposadr[j] in own}
+        tree = {model.body_treeid[b] for b in moved}
+        pins = [e for e in pins if model.body_treeid[model.site_bodyid[model.eq_obj1id[e]]] in tree]
+        free = [at for at in own if at not in driven and at not in loose]
         if not pins or not free:
             return 0.0
 
@@ -135,14 +139,14 @@ class Plant:
             qpos[free] -= np.linalg.lstsq(jacobian, off, rcond=1e-9)[0]
         return float(np.abs(gaps()).max())
 
-    def run(self, at, start, goal, others):
+    def run(self, at, start, goal, own):
         """Deepest contact along a path, what touches there, and how far pins gaped."""
         n = max(2, int(np.ceil(np.abs(goal - start).max() / STEP)) + 1)
         deepest, gaped = (0.0, None, 0.0), 0.0
         self.qpos = self.start.copy()
         for share in np.linspace(0.0, 1.0, n):
             self.qpos[at] = start + share * (goal - start)
-            gaped = max(gaped, self.follow(set(at) | others))
+            gaped = max(gaped, self.follow(own, set(at)))
             for pair, depth in self.contacts():
                 if deepest[1] is None or depth > deepest[0]:
                     deepest = (depth, pair, share)
@@ -158,12 +162,7 @@ def paths(args, out, wanted, draw, writer):
         plant = Plant(args.program, out, args.bound, robot["id"])
         names = list(robot["joints"])
         at = np.array([plant.joints[f"{robot['id']}/{name}"] for name in names])
-        others = {
-            plant.joints[f"{r['id']}/{n}"]
-            for r in result["robots"]
-            for n in r["joints"]
-            if f"{r['id']}/{n}" in plant.joints
-        }
+        own = [at for name, at in plant.joints.items() if name.startswith(f"{robot['id']}/")]
         start = plant.start[at]
         ranges = []
         for name in names:
@@ -194,7 +193,7 @@ def paths(args, out, wanted, draw, writer):
                 continue
             done[outcome] += 1
             counts[outcome] += 1
-            (depth, pair, share), gaped = plant.run(at, start, goal, others)
+            (depth, pair, share), gaped = plant.run(at, start, goal, own)
             hits = [c for c in said["contacts"] if c["level"] in ("hit", "inside")]
             row = {
                 "plant": out.name if out.name != "result" else out.parent.name,
