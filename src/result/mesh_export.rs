@@ -136,7 +136,7 @@ pub fn export_mesh(request: &MeshRequest, engine: &Engine) -> Result<MeshOutcome
         let path = place("convex.obj".into())?;
         export::atomic::write(&path, &surface::pieces_obj(&pieces))?;
         report["convex"] = json!({
-            "file": "convex.obj", "pieces": pieces.len(), "farthest_from_mesh": found.bound,
+            "file": "convex.obj", "pieces": pieces.len(), "excess": found.bound,
         });
         paths.push(path);
     }
