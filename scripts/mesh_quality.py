@@ -52,17 +52,23 @@ def spaces(out):
             yield space["edge"], np.array(space["origin"]), np.load(f"{out}/{space['grid']}")
 
 
-def share_in_free(mesh, grids, n=1_000_000):
-    """Share of the area that lies in voxels that are free in one grid and filled in none."""
+def share_in_free(mesh, grids, n=1_000_000, depth=0.0):
+    """Share of the area that lies in voxels that are free in one grid and filled in none.
+
+    With `depth` only what is farther than that, in metres, from all voxels that are filled.
+    """
     o3d.utility.random.seed(1)
     points = np.asarray(mesh.sample_points_uniformly(n).points)
+    steps = np.array(np.meshgrid(*[[-1, 0, 1]] * 3)).reshape(3, -1).T if depth else [[0, 0, 0]]
     free, filled = np.zeros(n, bool), np.zeros(n, bool)
     for edge, origin, kinds in grids:
-        at = np.floor((points - origin) / edge + 1e-9).astype(int)
-        inside = ((at >= 0) & (at < kinds.shape)).all(axis=1)
-        own = kinds[tuple(at[inside].T)]
-        free[inside] |= own == 1
-        filled[inside] |= own >= 2
+        for step in np.asarray(steps):
+            at = np.floor((points + depth * step - origin) / edge + 1e-9).astype(int)
+            inside = ((at >= 0) & (at < kinds.shape)).all(axis=1)
+            own = kinds[tuple(at[inside].T)]
+            if not step.any():
+                free[inside] |= own == 1
+            filled[inside] |= own >= 2
     return float((free & ~filled).mean())
 
 
@@ -118,4 +124,5 @@ def main():
         measure("Poisson", poisson, xyz[stands], things, out)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -252,6 +252,9 @@ pub(super) struct MeshFlags {
     /// Mesh: also the space around robots that no beam passed through, as a closed mesh
     #[arg(long)]
     pub(super) unknown: bool,
+    /// Mesh: also convex pieces that cover it, for programs that collide convex bodies only
+    #[arg(long)]
+    pub(super) convex: bool,
 }
 
 #[derive(Debug, Args)]

@@ -121,7 +121,7 @@ fn say_paths(written: &[PathBuf], words: &str, say: &Say) -> u8 {
 
 /// The mesh that flags ask for.
 fn mesh_request(flags: &ExportFlags) -> Result<MeshRequest> {
-    let MeshFlags { bound, triangles, mesh_format, robot, unknown } = &flags.mesh;
+    let MeshFlags { bound, triangles, mesh_format, robot, unknown, convex } = &flags.mesh;
     let bound = bound.unwrap_or(BOUND);
     let [low, high] = BOUNDS;
     if !(low..=high).contains(&bound) {
@@ -139,6 +139,7 @@ fn mesh_request(flags: &ExportFlags) -> Result<MeshRequest> {
         format: mesh_format.unwrap_or(MeshFormat::Stl),
         robot: robot.clone(),
         with_unknown: *unknown,
+        with_convex: *convex,
     })
 }
 
@@ -163,10 +164,11 @@ fn flags_fit(flags: &ExportFlags, scene: Option<SceneFormat>) -> Result<()> {
     if scene.is_none() && flags.robots.is_some() {
         return usage("--robots is for scenes".into(), "leave it out for this format");
     }
-    let MeshFlags { bound, triangles, mesh_format, robot, unknown } = &flags.mesh;
+    let MeshFlags { bound, triangles, mesh_format, robot, unknown, convex } = &flags.mesh;
     let has_any = bound.is_some() || triangles.is_some() || mesh_format.is_some();
-    if flags.to != ExportFormat::Mesh && (has_any || robot.is_some() || *unknown) {
-        let what = "--bound, --triangles, --mesh-format, --robot and --unknown are for meshes";
+    if flags.to != ExportFormat::Mesh && (has_any || robot.is_some() || *unknown || *convex) {
+        let what = "--bound, --triangles, --mesh-format, --robot, --unknown and --convex are for \
+                    meshes";
         return usage(what.into(), "leave them out for this format, or give --to mesh");
     }
     let Some(name) = &flags.package else { return Ok(()) };

@@ -11,7 +11,8 @@ use geometry::Aabb;
 use std::path::PathBuf;
 use surface::{
     ChunkVoxels, EDGE_PER_BOUND, ERROR_PER_BOUND, FarPoints, FreeSpace, OccupiedVoxels,
-    SurfaceMesh, TriangleGrid, VoxelLattice, chunk_surface, join_surfaces,
+    SurfaceMesh, TriangleGrid, VoxelLattice, chunk_surface, convex_blocks, convex_pieces,
+    join_surfaces,
 };
 
 /// Bounds that a mesh may have, metres.
@@ -21,6 +22,10 @@ pub(crate) const BOUNDS: [f64; 2] = [0.002, 0.5];
 const TRIES: usize = 8;
 /// Smallest and largest factor from one bound to the next.
 const FACTORS: [f64; 2] = [1.15, 3.0];
+
+/// Distance beyond which a point is put into a box, as a share of the bound. The rest is left to the
+/// noise of beams, so that hardly any true surface is farther than the bound.
+const HELD: f64 = 0.75;
 
 /// Least share of the way from one tried bound to the other that the next one keeps from both.
 const WITHIN: f64 = 0.2;
@@ -163,7 +168,7 @@ impl MeshedResult<'_> {
                     return Ok((0.0, far));
                 }
                 let grid = TriangleGrid::new(mesh, bounds, bound);
-                let (most, mut farthest) = ((bound * bound) as f32, 0.0_f32);
+                let (most, mut farthest) = ((HELD * bound).powi(2) as f32, 0.0_f32);
                 self.each_point(tile, |world, moves| {
                     if moves {
                         return Ok(());
@@ -239,6 +244,15 @@ fn join_all(
         parts = engine.fan_out("join", groups, join)?;
     }
     Ok(parts.pop().map(|(_, mesh)| mesh).unwrap_or_default())
+}
+
+/// Convex pieces that cover a mesh, whose sides are no farther from it than `excess`, metres.
+pub(super) fn convex(mesh: &SurfaceMesh, excess: f64, engine: &Engine) -> Result<Vec<SurfaceMesh>> {
+    let blocks = convex_blocks(mesh);
+    let pieces = engine.fan_out(Task::new("convex").large(), blocks, |(at, own)| {
+        Ok(convex_pieces(at, &own, excess))
+    })?;
+    Ok(pieces.into_iter().flatten().collect())
 }
 
 /// The surface of all voxels that are unknown in some space and known in none.

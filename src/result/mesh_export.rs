@@ -4,10 +4,11 @@
 //! ```text
 //! fixed.stl     the surface of all that stands still (or .ply, .obj, .glb)
 //! unknown.stl   the space that no beam passed through, on request
+//! convex.obj    convex pieces that cover the surface, on request: an object each
 //! mesh.json     the bound, what was measured, what was left out
 //! ```
 
-use super::mesh_build::{BoundedMesh, MeshedResult, unknown};
+use super::mesh_build::{BoundedMesh, MeshedResult, convex, unknown};
 use super::plant_state::PlantState;
 use crate::cache::{EXPORT, VerifiedFiles, tiles_of};
 use crate::engine::Engine;
@@ -48,6 +49,8 @@ pub struct MeshRequest {
     pub robot: Option<String>,
     /// Whether unknown space is written, too.
     pub with_unknown: bool,
+    /// Whether convex pieces are written, too.
+    pub with_convex: bool,
 }
 
 impl MeshFormat {
@@ -125,6 +128,15 @@ pub fn export_mesh(request: &MeshRequest, engine: &Engine) -> Result<MeshOutcome
             "file": format!("unknown.{ending}"),
             "triangles": mesh.triangles.len(),
             "area": surface_area(&mesh, &FreeSpace::default()).all,
+        });
+        paths.push(path);
+    }
+    if request.with_convex {
+        let pieces = convex(&found.mesh, found.bound, engine)?;
+        let path = place("convex.obj".into())?;
+        export::atomic::write(&path, &surface::pieces_obj(&pieces))?;
+        report["convex"] = json!({
+            "file": "convex.obj", "pieces": pieces.len(), "excess": found.bound,
         });
         paths.push(path);
     }

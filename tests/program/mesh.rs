@@ -50,6 +50,40 @@ fn of_ply(bytes: &[u8]) -> SurfaceMesh {
     mesh
 }
 
+/// The objects of an OBJ of this program.
+fn of_obj(text: &str) -> Vec<SurfaceMesh> {
+    let (mut out, mut first): (Vec<SurfaceMesh>, u32) = (Vec::new(), 1);
+    for line in text.lines() {
+        let mut words = line.split(' ');
+        let what = words.next().expect("a word");
+        let values: Vec<&str> = words.collect();
+        match (what, out.last_mut()) {
+            ("o", last) => {
+                first += last.map_or(0, |last| last.vertices.len() as u32);
+                out.push(SurfaceMesh::default());
+            }
+            ("v", Some(last)) => {
+                last.vertices.push([0, 1, 2].map(|i| values[i].parse().expect("metres")));
+            }
+            ("f", Some(last)) => {
+                let corner = |i: usize| values[i].parse::<u32>().expect("a corner") - first;
+                last.triangles.push([0, 1, 2].map(corner));
+            }
+            _ => {}
+        }
+    }
+    out
+}
+
+/// Whether a place lies in a convex piece, to the rounding of its file.
+fn holds(piece: &SurfaceMesh, at: [f64; 3]) -> bool {
+    piece.triangles.iter().all(|t| {
+        let [a, b, c] = piece.corners(*t).map(geometry::Point::from);
+        let normal = (b - a).cross(&(c - a));
+        normal.dot(&(geometry::Point::from(at) - a)) <= 1e-4 * normal.norm()
+    })
+}
+
 #[test]
 fn what_points_block_the_mesh_blocks() {
     let dir = tempfile::tempdir().expect("a folder");
@@ -61,7 +95,8 @@ fn what_points_block_the_mesh_blocks() {
     let (bytes, report) = mesh(dir, &["--threads", "2"]);
     let (again, _) = mesh(dir, &["--threads", "1"]);
     assert!(bytes == again, "one thread writes another mesh");
-    assert!(report["measured_maximum"].as_f64().expect("measured") <= 0.0101, "{report}");
+    // What is left of the bound is for the noise of beams.
+    assert!(report["measured_maximum"].as_f64().expect("measured") <= 0.00751, "{report}");
     let (all, free) = (&report["area"], &report["area_in_free_space"]);
     let share = free.as_f64().expect("known") / all.as_f64().expect("an area");
     assert!(share < 0.005, "{report}");
@@ -103,6 +138,16 @@ fn what_points_block_the_mesh_blocks() {
     assert!(of_ply(&few).triangles.len() <= 3000, "{report}");
     let (bound, most) = (&report["bound"], &report["measured_maximum"]);
     assert!(bound.as_f64() > Some(0.01) && most.as_f64() <= bound.as_f64(), "{report}");
+
+    // Convex pieces are closed and cover the mesh's corners.
+    let (few, report) = mesh(dir, &["--triangles", "3000", "--convex"]);
+    let text = std::fs::read_to_string(dir.join("out/export/mesh/convex.obj")).expect("pieces");
+    let pieces = of_obj(&text);
+    assert_eq!(report["convex"]["pieces"].as_u64(), Some(pieces.len() as u64), "{report}");
+    let corners = of_ply(&few).vertices;
+    for at in corners.iter().step_by(corners.len() / 100) {
+        assert!(pieces.iter().any(|piece| holds(piece, *at)), "{at:?}");
+    }
 
     // One robot's surroundings, and what nobody saw of them.
     let (_, report) = mesh(dir, &["--robot", "R1", "--unknown"]);

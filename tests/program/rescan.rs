@@ -173,7 +173,56 @@ fn a_rescanned_cell_is_brought_up_to_date(plant: &Plant) {
     for name in ["base", "again"] {
         spaces_hold_what_tiles_hold(&plant.path(name));
     }
+    exports_leave_out_what_is_superseded(plant, &things);
     goes_on(plant, &out);
+}
+
+/// Old points that the new session supersedes are gone from scans that are given back, from
+/// clouds and from meshes: all three hold the same points, and no mesh is where a thing was
+/// taken away.
+fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Value]) {
+    let export = |name: &str, more: &[&str]| {
+        let output = plant.run(&[&["export", name, "--to"], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        plant.path(name).join("export")
+    };
+    let gone = things.iter().find(|t| t["change"] == "gone").expect("a thing that is gone");
+    let bound = |k: usize, i: usize| gone["then"][k][i].as_f64().expect("metres");
+    // Points beside the bounds may belong to the floor and to neighbours.
+    let is_inside = |at: &[f64]| (0..3).all(|i| at[i] > bound(0, i) + 0.05 && at[i] < bound(1, i));
+    let meshed = |name: &str| {
+        let folder = export(name, &["mesh", "--mesh-format", "obj"]).join("mesh");
+        let text = std::fs::read_to_string(folder.join("fixed.obj")).expect("a mesh");
+        let corner = |line: &str| -> Vec<f64> {
+            line.split(' ').map(|v| v.parse().expect("metres")).collect()
+        };
+        let corners = text.lines().filter_map(|line| line.strip_prefix("v ")).map(corner);
+        let n = corners.filter(|at| is_inside(at)).count();
+        let report = std::fs::read_to_string(folder.join("mesh.json")).expect("a report");
+        let report: serde_json::Value = serde_json::from_str(&report).expect("it parses");
+        (n, report["points"].as_u64().expect("a number"))
+    };
+    let (before, _) = meshed("base");
+    let (after, n_meshed) = meshed("again");
+    assert!(before > 20 && after == 0, "{before} corners, then {after}, in {gone}");
+
+    let folder = export("again", &["e57"]).join("e57");
+    let valid = |name: &str| -> u64 {
+        let mut reader = e57::E57Reader::from_file(folder.join(name)).expect("an E57 file");
+        let clouds = reader.pointclouds();
+        let count = |cloud: &e57::PointCloud| {
+            let points = reader.pointcloud_simple(cloud).expect("points");
+            let is_valid = |point: &e57::Point| {
+                matches!(point.cartesian, e57::CartesianCoordinate::Valid { .. })
+            };
+            points.map(|point| point.expect("a point")).filter(is_valid).count() as u64
+        };
+        clouds.iter().map(count).sum()
+    };
+    assert_eq!(valid("scans.e57") + valid("2-scans.e57"), n_meshed);
+    let text = std::fs::read(export("again", &["ply"]).join("fixed.ply")).expect("a cloud");
+    let head = String::from_utf8_lossy(&text[..2000]).into_owned();
+    assert!(head.contains(&format!("element vertex {n_meshed}\n")), "{n_meshed}: {head}");
 }
 
 /// Each point of the tiles lies in a voxel that says so, in the space of each robot that has one

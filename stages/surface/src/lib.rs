@@ -7,6 +7,7 @@
 
 mod boxes;
 mod chunk;
+mod convex;
 mod distance;
 mod free;
 mod in_free;
@@ -19,10 +20,11 @@ mod write;
 
 pub use boxes::FarPoints;
 pub use chunk::ChunkVoxels;
+pub use convex::{BlockAt, CONVEX_BLOCK, convex_blocks, convex_pieces};
 pub use distance::TriangleGrid;
 pub use free::FreeSpace;
 pub use in_free::{SurfaceArea, surface_area};
 pub use mesh::SurfaceMesh;
 pub use reduce::{ChunkSurface, EDGE_PER_BOUND, ERROR_PER_BOUND, chunk_surface, join_surfaces};
 pub use voxels::{ChunkAt, OccupiedVoxels, VoxelLattice};
-pub use write::{surface_glb, surface_obj, surface_ply, surface_stl};
+pub use write::{pieces_obj, surface_glb, surface_obj, surface_ply, surface_stl};

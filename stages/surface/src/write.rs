@@ -44,6 +44,26 @@ pub fn surface_obj(mesh: &SurfaceMesh) -> Vec<u8> {
     out
 }
 
+/// Pieces as OBJ: an object each, named `piece_0` and on.
+#[must_use]
+pub fn pieces_obj(pieces: &[SurfaceMesh]) -> Vec<u8> {
+    let mut out = b"# metres, z up\n".to_vec();
+    let mut first = 1;
+    for (k, mesh) in pieces.iter().enumerate() {
+        // Writing to memory does not fail.
+        let _ = writeln!(out, "o piece_{k}");
+        for [x, y, z] in &mesh.vertices {
+            let _ = writeln!(out, "v {x:.6} {y:.6} {z:.6}");
+        }
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|i| i + first);
+            let _ = writeln!(out, "f {a} {b} {c}");
+        }
+        first += mesh.vertices.len() as u32;
+    }
+    out
+}
+
 /// A mesh as binary glTF. Its root node turns z up to y up and holds the place of the middle, so
 /// that single precision serves in map coordinates, too.
 ///
