@@ -1,12 +1,16 @@
 // Opens the page of a result in a headless Chromium with the network off and checks it: no error on
-// the console, no request, numbers as in result.json, and that turning, filtering and moving a joint
-// change the picture. Not part of CI, which has no browser.
+// the console, no request, no serious fault for axe, numbers as in result.json, and that turning,
+// choosing, filtering and moving a joint change what is seen. Four sizes and schemes; frames a second
+// while it moves. Not part of CI, which has no browser.
+//
+// `BASE=FOLDER` compares the screenshots with those of an earlier call: no more than one pixel of two
+// hundred may differ. `ONLY=rest` takes screenshots alone.
 //
 //   npm install --prefix DIR playwright-core axe-core
 //   NODE_PATH=DIR/node_modules CHROMIUM=/usr/bin/chromium \
 //     node scripts/report_page.mjs OUT/report.html OUT/result.json [FOLDER FOR SCREENSHOTS]
 import { createRequire } from "node:module";
-import { readFileSync, mkdirSync, writeFileSync } from "node:fs";
+import { existsSync, readFileSync, mkdirSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 import { resolve, join } from "node:path";
 
@@ -58,6 +62,103 @@ async function shot(page, name, whole = false) {
   if (shots) writeFileSync(join(shots, `${name}.png`), await page.screenshot({ fullPage: whole }));
 }
 
+/** The share of pixels that differ between two pictures, by any browser page. */
+const differing = (page, a, b) => page.evaluate(async (both) => {
+  const [one, other] = await Promise.all(both.map(async (text) => {
+    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+    const canvas = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    canvas.drawImage(image, 0, 0);
+    return canvas.getImageData(0, 0, image.width, image.height);
+  }));
+  if (one.width !== other.width || one.height !== other.height) return 1;
+  let n = 0;
+  for (let i = 0; i < one.data.length; i += 4) {
+    n += [0, 1, 2].some((k) => Math.abs(one.data[i + k] - other.data[i + k]) > 24);
+  }
+  return n / (one.data.length / 4);
+}, [a, b]);
+
+/** Compares a screenshot with that of an earlier call. */
+async function asBefore(page, name) {
+  const path = process.env.BASE && join(process.env.BASE, `${name}.png`);
+  if (!path || !existsSync(path)) return;
+  const share = await differing(page, readFileSync(path).toString("base64"),
+    (await page.screenshot()).toString("base64"));
+  check(share < 0.005, `${name}: looks as before`, `${(100 * share).toFixed(2)} % of it differs`);
+}
+
+/** A window that was wide and became narrow shows what one that was narrow from the start shows. */
+async function narrows() {
+  const wide = await open(1280, 800, "light");
+  await wide.page.setViewportSize({ width: 390, height: 844 });
+  await wide.page.waitForTimeout(400);
+  await rest(wide.page);
+  const narrow = await open(390, 844, "light");
+  const share = await differing(narrow.page, await picture(narrow.page), await picture(wide.page));
+  // Buttons are larger on a touch screen, and only the narrow one is opened as such.
+  check(share < 0.04, "a window made narrow shows all of the plant", `${(100 * share).toFixed(2)} % differ`);
+  await Promise.all([wide.context.close(), narrow.context.close()]);
+}
+
+/** Choosing a robot by its name in the view and by its body; filtering the table. */
+async function chooses(page) {
+  const names = page.locator("#labels button:visible");
+  if (await names.count()) {
+    const id = await names.first().textContent();
+    const before = await picture(page);
+    await names.first().click();
+    await rest(page);
+    check((await page.locator("#joints option:checked").textContent()).startsWith(id),
+      "a click on a name chooses the robot");
+    check(await picture(page) !== before, "and shows it");
+    await page.locator("#tools [data-do=home]").click();
+    await rest(page);
+  }
+  const search = page.getByLabel("Filter robots by name or model");
+  if (!await search.count()) return;
+  const rows = page.locator("#robots > .scroll tbody tr:visible");
+  const last = result.robots[result.robots.length - 1];
+  await search.fill(last.model);
+  const wanted = result.robots.filter((r) => `${r.id} ${r.model}`.includes(last.model)).length;
+  check(await rows.count() === wanted, "the filter leaves robots of one model", `${wanted}`);
+  await search.fill("");
+  const verdict = page.getByLabel("Filter robots by verdict");
+  for (const word of ["trusted", "doubtful", "refused"]) {
+    await verdict.selectOption(word);
+    const n = result.robots.filter((r) => r.verdict === word).length;
+    check(await rows.count() === n, `the filter leaves ${n} ${word}`);
+  }
+  await verdict.selectOption({ index: 0 });
+}
+
+/** After a rescan: what changed, before and after. */
+async function changed(page) {
+  if (!result.rescan) return;
+  const data = JSON.parse(await page.locator("#data").textContent());
+  const { robots, things } = data.changes;
+  check(await page.locator("#changes").isVisible(), "what changed has its section");
+  const [first, ...more] = await page.locator("#changes table").evaluateAll((all) =>
+    all.map((table) => table.tBodies[0].rows.length));
+  check(first === robots.length, "each robot of the cell has a row", `${first}`);
+  if (things.length) check(more.at(-1) === things.length, "each thing has a row", `${things.length}`);
+  const moved = robots.some((r) => r.joints.some((j) => j.is_change));
+  if (moved) {
+    const was = page.locator("#classes label", { hasText: "Robots before the rescan" });
+    check(await was.count() === 1, "the earlier posture can be shown");
+    await page.locator("#tools [data-do=home]").click();
+    await rest(page);
+    const before = await picture(page);
+    await was.click();
+    await rest(page);
+    check(await picture(page) !== before, "hiding the earlier posture changes the picture");
+    await was.click();
+  }
+  await page.locator("#changes").scrollIntoViewIfNeeded();
+  if (shots) writeFileSync(join(shots, "changes.png"), await page.locator("#changes").screenshot());
+  await page.evaluate(() => scrollTo(0, 0));
+}
+
 /** What is said, asked and drawn at one size. */
 async function look(width, height, scheme) {
   const name = `${width}_${scheme}`;
@@ -65,6 +166,7 @@ async function look(width, height, scheme) {
   check((await page.evaluate(() => document.documentElement.dataset.state)) === "ready",
     `${name}: the view is there`, `after ${took} ms, whole after ${whole} ms`);
   await shot(page, `${name}_rest`);
+  await asBefore(page, `${name}_rest`);
   await shot(page, `${name}_page`, true);
   const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
   check(wide <= 0, `${name}: nothing is wider than the screen`, String(wide));
@@ -132,6 +234,9 @@ async function moves(page) {
     await page.locator("#joints button", { hasText: "As found" }).click();
     await differs("back to as found");
   }
+  await page.locator("#tools [data-do=home]").click();
+  await rest(page);
+  before = await picture(page);
   await page.locator("#cut summary").click();
   await page.locator("#section input").nth(1).focus();
   for (let i = 0; i < 4; i++) await page.keyboard.press("PageDown");
@@ -167,7 +272,12 @@ async function numbers(page) {
 
 const first = await look(1280, 800, "light");
 await numbers(first.page);
-await moves(first.page);
+if (process.env.ONLY !== "rest") {
+  await chooses(first.page);
+  await changed(first.page);
+  await moves(first.page);
+  await narrows();
+}
 await first.page.emulateMedia({ media: "print" });
 if (shots) writeFileSync(join(shots, "print.pdf"), await first.page.pdf({ format: "A4" }));
 const others = [await look(1280, 800, "dark"), await look(390, 844, "light"), await look(390, 844, "dark")];

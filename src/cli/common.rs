@@ -1,6 +1,6 @@
 //! Flags of all commands, and what they come to together with configuration and environment.
 
-use super::say::LogFormat;
+use super::say::{Colours, LogFormat};
 use crate::engine::progress::{Mode, Progress};
 use crate::engine::{Engine, WatchedWork};
 use crate::job::{FlagValues, Means};
@@ -63,6 +63,12 @@ pub(super) struct Common {
     /// How warnings and errors are written
     #[arg(long, global = true, value_enum, value_name = "HOW", default_value = "text")]
     pub(super) log_format: LogFormat,
+    /// When verdicts, warnings and errors are coloured
+    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value = "auto")]
+    pub(super) color: Colours,
+    /// On a terminal, leave a line for each stage that has ended above the bar
+    #[arg(long, short, global = true)]
+    verbose: bool,
     /// Cancellation and progress of a program that calls the command in its own process.
     #[arg(skip)]
     pub(super) watched: Option<WatchedWork>,
@@ -116,7 +122,10 @@ impl Common {
             // With JSON requested, bars and lines for people are left out.
             (Some(Mode::None), LogFormat::Json) => Progress::json_without_progress(),
             (_, LogFormat::Json) => Progress::new(Mode::Json),
-            (mode, LogFormat::Text) => Progress::new(mode.unwrap_or_else(Mode::fitting)),
+            (mode, LogFormat::Text) => match mode.unwrap_or_else(Mode::fitting) {
+                Mode::Bar if self.verbose => Progress::bar_with_stages(),
+                mode => Progress::new(mode),
+            },
         }
     }
 

@@ -331,6 +331,10 @@ pub(super) struct ReportFlags {
     /// browser shows offline; a later run into OUT replaces it if the result has changed
     #[arg(long)]
     pub(super) html: bool,
+    /// Write a page to this file that also shows times, rates and memory of the run; these differ
+    /// from run to run, so OUT/report.html has none
+    #[arg(long, value_name = "FILE")]
+    pub(super) page: Option<PathBuf>,
     /// Print the data of that page as JSON
     #[arg(long)]
     pub(super) json: bool,

@@ -16,6 +16,12 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("The program itself", &["config", "schema", "completions", "manual", "help"]),
 ];
 
+/// Columns of a terminal of the usual size. Help is as wide on any other, so that pages and logs
+/// that quote it agree.
+const WIDTH: usize = 80;
+/// Columns of a command's name in the list of commands, with the space around it.
+const NAMES: usize = 15;
+
 /// Options about coordinates of inputs, and the commands that read inputs of their users.
 const OF_INPUTS: [&str; 2] = ["scanners", "units"];
 const READ_INPUTS: [&str; 9] =
@@ -25,7 +31,7 @@ const SEARCH: [&str; 9] =
     ["run", "plan", "rescan", "shards", "shard", "gather", "demo", "bench", "config"];
 /// Commands that read small files or none: neither memory nor threads nor settings matter to them.
 const SMALL: [&str; 5] = ["diff", "history", "schema", "completions", "manual"];
-const OF_WORK: [&str; 5] = ["memory", "threads", "config", "set", "progress"];
+const OF_WORK: [&str; 6] = ["memory", "threads", "config", "set", "progress", "verbose"];
 
 /// The command line. Options that a command does not use are hidden from its help, but accepted, so
 /// that scripts may give the same common options to every command.
@@ -49,6 +55,7 @@ pub(super) fn command() -> Command {
         });
     }
     let groups = groups(&line);
+    let line = line.term_width(WIDTH);
     line.help_template(format!("{{about}}\n\n{{usage-heading}} {{usage}}\n\n{groups}{{options}}"))
 }
 
@@ -61,11 +68,28 @@ fn groups(line: &Command) -> String {
             let about = line.find_subcommand(name).and_then(Command::get_about);
             let about =
                 about.map_or_else(|| "Print the help of a command".into(), |a| a.to_string());
-            let _ = writeln!(text, "  {name:<12} {about}");
+            let _ = writeln!(text, "  {name:<12} {}", wrapped(&about));
         }
         text.push('\n');
     }
     text
+}
+
+/// A text in lines beside the names of commands.
+fn wrapped(about: &str) -> String {
+    let mut lines = vec![String::new()];
+    for word in about.split_whitespace() {
+        let last = lines.last_mut().expect("there is one line from the start");
+        if last.is_empty() {
+            last.push_str(word);
+        } else if NAMES + last.len() + 1 + word.len() <= WIDTH {
+            last.push(' ');
+            last.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines.join(&format!("\n{:NAMES$}", ""))
 }
 
 #[cfg(test)]
@@ -81,6 +105,21 @@ mod tests {
         listed.sort_unstable();
         all.sort_unstable();
         assert_eq!(listed, all);
+    }
+
+    #[test]
+    fn no_help_is_wider_than_a_terminal() {
+        fn check(command: &mut Command) {
+            for help in [command.render_help(), command.render_long_help()] {
+                let help = help.to_string();
+                let wide = help.lines().find(|line| line.chars().count() > WIDTH);
+                assert_eq!(wide, None, "{}", command.get_name());
+            }
+            command.get_subcommands_mut().for_each(check);
+        }
+        let mut line = command();
+        line.build();
+        check(&mut line);
     }
 
     #[test]

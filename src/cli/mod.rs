@@ -44,7 +44,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(line) => line,
         Err(error) => return refuse(&error, &args),
     };
-    let say = Say::new(line.common.log_format);
+    let say = Say::new(line.common.log_format).coloured(line.common.color);
     say.for_panics();
     let done = fence::fenced(|| run(&line, &say)).unwrap_or_else(|what| {
         Err(Error::new(Kind::Bug, format!("the program ended by a panic: {what}"))

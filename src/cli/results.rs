@@ -16,7 +16,7 @@ use crate::result::conversion::{ExportFormat, convert};
 use crate::result::history;
 use crate::result::mesh_build::BOUNDS;
 use crate::result::mesh_export::{MeshFormat, MeshRequest, export_mesh};
-use crate::result::page::{page_data, write_page};
+use crate::result::page::{page_data, write_page, write_page_with_run};
 use crate::result::scans_back::{ScansBack, give_scans_back};
 use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
 use crate::result::text_report::text_report;
@@ -61,6 +61,12 @@ pub(super) fn report(flags: &ReportFlags, common: &Common, say: &Say) -> Result<
         let page = write_page(&flags.out, &means, &common.engine(&means)?)?;
         summary = format!("{}\npage in {}", summary.trim_end(), page.display());
     }
+    if let Some(to) = &flags.page {
+        refuse_own_files(&files, &flags.out, to)?;
+        let means = common.means()?;
+        write_page_with_run(&flags.out, to, &means, &common.engine(&means)?)?;
+        summary = format!("{}\npage in {}", summary.trim_end(), to.display());
+    }
     if flags.json {
         let means = common.means()?;
         say.result(&page_data(&flags.out, &means, &common.engine(&means)?)?);
@@ -68,6 +74,18 @@ pub(super) fn report(flags: &ReportFlags, common: &Common, say: &Say) -> Result<
         say.outcome(&Outcome { summary, warnings, partial, ..Outcome::default() });
     }
     Ok(if partial { exit::PARTIAL } else { exit::OK })
+}
+
+/// Refuses a file of the result as the place of a page: `verify` would find it changed.
+fn refuse_own_files(files: &VerifiedFiles, out: &Path, to: &Path) -> Result<()> {
+    let whole = |path: &Path| path.canonicalize().ok();
+    let is_own = |file: &str| whole(to).is_some_and(|to| whole(&out.join(file)) == Some(to));
+    match files.manifest().files.iter().find(|file| is_own(&file.path)) {
+        None => Ok(()),
+        Some(own) => Err(Error::new(Kind::Usage, "this is a file of the result")
+            .at(format!("{}, {}", to.display(), own.path))
+            .hint("give --page another name, for example page.html")),
+    }
 }
 
 pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<u8> {

@@ -3,7 +3,7 @@
 
 use crate::job::Outcome;
 use contract::{Error, Kind, Result, fence, quote};
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 
 /// How warnings and errors are written.
@@ -13,6 +13,55 @@ pub(super) enum LogFormat {
     Text,
     /// As JSON for programs, one object per line.
     Json,
+}
+
+/// When words are coloured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Colours {
+    /// On a terminal, unless NO_COLOR is set.
+    Auto,
+    /// Always, also in files and pipes.
+    Always,
+    /// Never.
+    Never,
+}
+
+impl Colours {
+    fn are_on(self, is_terminal: bool) -> bool {
+        let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+        let is_dumb = || std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+        match self {
+            Self::Auto => is_terminal && !is_set("NO_COLOR") && !is_dumb(),
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
+}
+
+/// Codes that colour a word on a terminal, and the code that ends all.
+const GREEN: &str = "\x1b[32m";
+const YELLOW: &str = "\x1b[33m";
+const RED: &str = "\x1b[31m";
+const PLAIN: &str = "\x1b[0m";
+/// Verdicts and words about joints, with what stands before them where they are such, and colours.
+const COLOURED: [(&[&str], &str, &str); 5] = [
+    (&[": ", ", "], "trusted", GREEN),
+    (&[": ", ", "], "doubtful", YELLOW),
+    (&[": ", ", "], "refused", RED),
+    (&["° ", "mm "], "undetermined", RED),
+    (&["° ", "mm "], "coarse", YELLOW),
+];
+
+/// The text with the words of [`COLOURED`] in colour.
+fn coloured(text: &str) -> String {
+    let mut text = text.to_owned();
+    for (before, word, colour) in COLOURED {
+        for before in before {
+            let found = format!("{before}{word}");
+            text = text.replace(&found, &format!("{before}{colour}{word}{PLAIN}"));
+        }
+    }
+    text
 }
 
 /// The answer of a command that did not fail.
@@ -31,6 +80,8 @@ pub struct CommandAnswer {
 /// Writes results, warnings and errors.
 pub(super) struct Say {
     format: LogFormat,
+    /// Whether standard output and standard error are coloured.
+    colours: [bool; 2],
     /// What was said so far, where another program is to get it; nothing is printed then.
     kept: Option<Mutex<CommandAnswer>>,
 }
@@ -44,12 +95,19 @@ pub(super) fn json(value: &impl serde::Serialize) -> Result<String> {
 
 impl Say {
     pub(super) fn new(format: LogFormat) -> Self {
-        Self { format, kept: None }
+        Self { format, colours: [false; 2], kept: None }
+    }
+
+    /// The same with words in colour, as the user wishes and the terminal can.
+    pub(super) fn coloured(mut self, wish: Colours) -> Self {
+        let terminals = [std::io::stdout().is_terminal(), std::io::stderr().is_terminal()];
+        self.colours = terminals.map(|is_terminal| wish.are_on(is_terminal));
+        self
     }
 
     /// Keeps all results and warnings instead of writing them.
     pub(super) fn keeping() -> Self {
-        Self { format: LogFormat::Text, kept: Some(Mutex::default()) }
+        Self { kept: Some(Mutex::default()), ..Self::new(LogFormat::Text) }
     }
 
     /// What was kept.
@@ -82,11 +140,18 @@ impl Say {
 
     /// Writes a result to standard output. A closed pipe is not an error.
     pub(super) fn result(&self, text: &str) {
+        self.print(text, false);
+    }
+
+    /// Writes a text to standard output, with verdicts in colour where it is for people.
+    fn print(&self, text: &str, is_prose: bool) {
         if self.keeps(|kept| kept.text += text) {
             return;
         }
+        let text = quote::printed(text.trim_end());
+        let text = if is_prose && self.colours[0] { coloured(&text).into() } else { text };
         let mut out = std::io::stdout().lock();
-        let _ = writeln!(out, "{}", quote::printed(text.trim_end())).and_then(|()| out.flush());
+        let _ = writeln!(out, "{text}").and_then(|()| out.flush());
     }
 
     /// Writes bytes that the program made itself to standard output. A closed pipe is not an error.
@@ -113,7 +178,7 @@ impl Say {
                 }
             });
         }
-        self.result(&outcome.summary);
+        self.print(&outcome.summary, true);
     }
 
     /// Writes a warning.
@@ -144,11 +209,21 @@ impl Say {
 
     fn line(&self, line: &str) {
         let line = match self.format {
+            LogFormat::Text if self.colours[1] => headed(&quote::printed(line)).into(),
             LogFormat::Text => quote::printed(line),
             LogFormat::Json => quote::json(line),
         };
         let _ = writeln!(std::io::stderr(), "{line}");
     }
+}
+
+/// A line with its first word in colour where that says that something is wrong.
+fn headed(line: &str) -> String {
+    let heads = [("error:", RED), ("warning:", YELLOW)];
+    let head = heads.iter().find_map(|(head, colour)| {
+        line.strip_prefix(head).map(|rest| format!("{colour}{head}{PLAIN}{rest}"))
+    });
+    head.unwrap_or_else(|| line.to_owned())
 }
 
 fn word(kind: Kind) -> &'static str {
@@ -167,6 +242,24 @@ fn word(kind: Kind) -> &'static str {
 mod tests {
     use super::*;
     use std::process::Command;
+
+    #[test]
+    fn verdicts_are_coloured_and_nothing_else_is() {
+        let line = "R1 arm at (0, 0, 0) m: doubtful, score 0.7\n  joint_1  2.9° ± 0.2° coarse";
+        let words = coloured(line);
+        assert!(words.contains("m: \x1b[33mdoubtful\x1b[0m, score"), "{words:?}");
+        assert!(words.contains("° \x1b[33mcoarse\x1b[0m"), "{words:?}");
+        let other = "note: joint 'x' is coarse; trusted_arm at (0, 0, 0) m";
+        assert_eq!(coloured(other), other);
+        assert_eq!(headed("error: x: y"), "\x1b[31merror:\x1b[0m x: y");
+        assert_eq!(headed("used again: x"), "used again: x");
+    }
+
+    #[test]
+    fn colours_follow_the_wish() {
+        assert!(Colours::Always.are_on(false) && !Colours::Never.are_on(true));
+        assert!(!Colours::Auto.are_on(false));
+    }
 
     /// Set in the process that panics, to the format that it is to speak in.
     const CHILD: &str = "STILLPOINT_TEST_PANICS";

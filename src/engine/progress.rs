@@ -7,15 +7,16 @@ use super::amount::Amount;
 use contract::quote;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use std::time::{Duration, Instant};
+pub(crate) use words::title;
 use words::{StageState, json, words};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Mode {
-    /// A bar that is redrawn, for a terminal.
+    /// One bar for the whole run, with the name of the stage, for a terminal.
     Bar,
     /// A line every few seconds and at the end of each stage, for a log.
     Plain,
@@ -39,6 +40,18 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 const JSON_EVERY: Duration = Duration::from_secs(1);
 /// Time between two redraws of a bar.
 const BAR_EVERY: Duration = Duration::from_millis(120);
+
+/// Steps of a bar from end to end.
+const BAR_STEPS: u64 = 1000;
+
+/// The bar of a run: the stage's name, how far it is, and words.
+fn only_bar() -> ProgressBar {
+    let bar = ProgressBar::new(BAR_STEPS);
+    if let Ok(style) = ProgressStyle::with_template("{prefix} [{bar:16}] {wide_msg}") {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar
+}
 
 /// Time and amount of work of a finished stage, for `result.json`.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +79,13 @@ struct Inner {
     out: Mutex<Box<dyn Write + Send>>,
     reports: Mutex<Vec<StageReport>>,
     bars: indicatif::MultiProgress,
+    /// The only bar, where there is one: it shows the stage that was at work last.
+    bar: Option<ProgressBar>,
+    /// Whether stages that have ended leave a line above the bar.
+    tells_stages: bool,
+    /// Number of stages that have begun and not ended.
+    n_running: AtomicUsize,
+    start: Instant,
 }
 
 /// A running stage. Clones share one state.
@@ -97,7 +117,6 @@ struct Running {
     done: [AtomicU64; 3],
     /// Milliseconds from `start` to the moment at which the next line is due.
     next_line: AtomicU64,
-    bar: Option<ProgressBar>,
     finished: Mutex<bool>,
     pieces: Pieces,
 }
@@ -137,7 +156,13 @@ impl Progress {
     /// Shows no progress, but writes notes, warnings and errors as JSON.
     #[must_use]
     pub fn json_without_progress() -> Self {
-        Self::with(Mode::None, true, Box::new(std::io::stderr()))
+        Self::with(Mode::None, true, false, Box::new(std::io::stderr()))
+    }
+
+    /// Shows a bar, and a line above it for each stage that has ended.
+    #[must_use]
+    pub fn bar_with_stages() -> Self {
+        Self::with(Mode::Bar, false, true, Box::new(std::io::stderr()))
     }
 
     /// Shows nothing; reports of stages are kept.
@@ -149,20 +174,26 @@ impl Progress {
     /// Writes lines to `out`; bars always go to standard error.
     #[must_use]
     pub fn to(mode: Mode, out: Box<dyn Write + Send>) -> Self {
-        Self::with(mode, mode == Mode::Json, out)
+        Self::with(mode, mode == Mode::Json, false, out)
     }
 
-    fn with(mode: Mode, is_json: bool, out: Box<dyn Write + Send>) -> Self {
+    fn with(mode: Mode, is_json: bool, tells_stages: bool, out: Box<dyn Write + Send>) -> Self {
         let target = match mode {
             Mode::Bar => ProgressDrawTarget::stderr(),
             _ => ProgressDrawTarget::hidden(),
         };
+        let bars = indicatif::MultiProgress::with_draw_target(target);
+        let bar = (mode == Mode::Bar).then(|| bars.add(only_bar()));
         Self(Arc::new(Inner {
             mode,
             is_json,
             out: Mutex::new(out),
             reports: Mutex::new(Vec::new()),
-            bars: indicatif::MultiProgress::with_draw_target(target),
+            bars,
+            bar,
+            tells_stages,
+            n_running: AtomicUsize::new(0),
+            start: Instant::now(),
         }))
     }
 
@@ -176,7 +207,9 @@ impl Progress {
     /// Like [`Progress::stage`], for a stage that also shows `pieces` of its items.
     #[must_use]
     pub fn stage_of(&self, name: &str, total: Amount, pieces: Pieces) -> Stage {
-        let bar = (self.0.mode == Mode::Bar).then(|| self.bar(name, &total));
+        if self.0.n_running.fetch_add(1, Ordering::Relaxed) == 0 {
+            self.0.bar.iter().for_each(ProgressBar::reset);
+        }
         let stage = Stage(Arc::new(Running {
             progress: self.clone(),
             name: name.to_owned(),
@@ -185,7 +218,6 @@ impl Progress {
             start_cpu: cpu_seconds(),
             done: Default::default(),
             next_line: AtomicU64::new(self.every().as_millis() as u64),
-            bar,
             finished: Mutex::new(false),
             pieces,
         }));
@@ -217,19 +249,6 @@ impl Progress {
             Mode::Bar => BAR_EVERY,
             Mode::Plain | Mode::None => LINE_EVERY,
         }
-    }
-
-    fn bar(&self, name: &str, total: &Amount) -> ProgressBar {
-        let known = total.share(total).is_some();
-        let bar = if known { ProgressBar::new(1000) } else { ProgressBar::new_spinner() };
-        let template =
-            if known { "{prefix:>12} [{bar:30}] {msg}" } else { "{prefix:>12} {spinner} {msg}" };
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style.progress_chars("=> "));
-        }
-        let bar = self.0.bars.add(bar);
-        bar.set_prefix(name.to_owned());
-        bar
     }
 
     /// A line that cannot be written does not end the run.
@@ -291,6 +310,27 @@ impl Running {
         reports.lock().unwrap_or_else(PoisonError::into_inner).push(report);
     }
 
+    /// Shows this stage on the only bar. Where no stage runs any more, the bar is wiped away, so
+    /// that results do not stand behind it.
+    fn draw(&self, bar: &ProgressBar, state: &StageState<'_>) {
+        let inner = &self.progress.0;
+        if state.is_over {
+            if inner.tells_stages {
+                self.progress.say(&format!("{}: {}", title(&self.name), words(state)));
+            }
+            if inner.n_running.fetch_sub(1, Ordering::Relaxed) == 1 {
+                bar.finish_and_clear();
+            }
+            return;
+        }
+        let share = state.done.share(state.total).unwrap_or(0.0);
+        bar.set_position((share * BAR_STEPS as f64) as u64);
+        bar.set_prefix(title(&self.name).to_owned());
+        let all = inner.start.elapsed().as_secs();
+        bar.set_message(format!("{}; {all} s in all", words(state)));
+        bar.tick();
+    }
+
     fn show(&self, seconds: f64, last: bool) {
         let done = self.done();
         let state = StageState {
@@ -301,19 +341,13 @@ impl Running {
             cpu_seconds: cpu_seconds() - self.start_cpu,
             is_over: last,
         };
-        match (self.progress.0.mode, &self.bar) {
+        match (self.progress.0.mode, &self.progress.0.bar) {
             (Mode::None, _) => {}
             (Mode::Json, _) => self.progress.line(&json(&self.name, &state)),
-            (_, Some(bar)) => {
-                let share = done.share(&self.total).unwrap_or(0.0);
-                bar.set_position((share * 1000.0) as u64);
-                bar.tick();
-                let message = words(&state);
-                if last { bar.finish_with_message(message) } else { bar.set_message(message) }
-            }
+            (_, Some(bar)) => self.draw(bar, &state),
             (_, None) => {
                 let words = words(&state);
-                self.progress.line(&format!("{}: {words}", self.name));
+                self.progress.line(&format!("{}: {words}", title(&self.name)));
             }
         }
     }
@@ -371,7 +405,7 @@ mod tests {
     fn a_short_stage_is_one_line_and_one_report() {
         let (text, reports) = told(Mode::Plain);
         assert_eq!(text.lines().count(), 1, "{text}");
-        assert!(text.starts_with("read: 100 %, 2.00 k points"), "{text}");
+        assert!(text.starts_with("reading scans: 100 %, 2.00 k points"), "{text}");
         assert_eq!(
             (reports[0].n_items, reports[0].n_points, reports[0].bytes),
             (1000, 2000, 24000)

@@ -17,12 +17,12 @@ use crate::io::read_parts::InputReader;
 use crate::job::Settings;
 use crate::store::Store;
 use attach::AttachedPieces;
-use contract::{Cluster, Fit, Floor, Input, InputId, Mask, Result, Space};
+use contract::{Cluster, Fit, Floor, Input, InputId, Mask, Result, Space, Verdict};
 use export::{
-    Clouds, FileSum, LasSettings, PROJECTION, Pack, PlanPicture, Quantum, RawVlr, RobotPicture,
-    SpaceEntry, Spool, Tiles, WrittenFiles, write_space,
+    Clouds, FileSum, LasSettings, PROJECTION, Pack, PlanPicture, PlanRobot, Quantum, RawVlr,
+    RobotPicture, SpaceEntry, Spool, Tiles, WrittenFiles, write_space,
 };
-use geometry::{Aabb, Pose};
+use geometry::{Aabb, Point, Pose};
 use ingest::{Sources, Want};
 use robot::Model;
 use segment::FloorHeights;
@@ -384,21 +384,32 @@ impl<'a> Labelling<'a> {
         })
     }
 
+    /// A robot as the plan shows it: one that was refused without outline and reach.
+    fn robot_in_plan(&self, i: usize) -> PlanRobot {
+        let fit = &self.fits[i];
+        let p = fit.world_from_base.translation.vector;
+        let name = robot_id(i);
+        if fit.verdict == Verdict::Refused {
+            return PlanRobot { name, at: [p.x, p.y], reach: 0.0, body: Vec::new() };
+        }
+        let model = &self.models[fit.model];
+        let poses = poses(fit, model);
+        let body = poses.iter().zip(&model.links).flat_map(|(pose, link)| {
+            link.cad.points.iter().map(move |point| {
+                let world = pose * Point::from(point.map(f64::from));
+                [world.x, world.y]
+            })
+        });
+        PlanRobot { name, at: [p.x, p.y], reach: model.reach(), body: body.collect() }
+    }
+
     fn draw_plan(
         &self,
         plan: &PlanPicture,
         input: InputId,
         out: &std::path::Path,
     ) -> Result<String> {
-        let robots: Vec<_> = self
-            .fits
-            .iter()
-            .enumerate()
-            .map(|(i, f)| {
-                let p = f.world_from_base.translation.vector;
-                (robot_id(i), [p.x, p.y])
-            })
-            .collect();
+        let robots: Vec<PlanRobot> = (0..self.fits.len()).map(|i| self.robot_in_plan(i)).collect();
         let scanners: Vec<_> = self
             .sources
             .scans

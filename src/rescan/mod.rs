@@ -30,6 +30,7 @@ use crate::detect::search::PreparedLibrary;
 use crate::engine::Engine;
 use crate::job::{Job, Outcome, units};
 use crate::positions;
+use crate::result::page;
 use crate::result::plant_state::PlantState;
 use crate::store::Store;
 use contract::{Error, Fit, Input, Kind, OneByOne, Result};
@@ -195,9 +196,10 @@ impl Rescan<'_> {
             ..base.state.clone()
         };
         state.write(output.next())?;
-        // A page takes all tiles of the plant, which a rescan does not read: it is made on request.
-        let no_page = |_: &VerifiedFiles| Ok(Vec::new());
-        WholeResult { job, output, digests, outcome, files }.publish(no_page, engine)
+        // The only step that reads all tiles of the plant; the settings can leave it out.
+        let next = output.next();
+        let page = |files: &VerifiedFiles| page::of_run(next, files, &job.means, engine);
+        WholeResult { job, output, digests, outcome, files }.publish(page, engine)
     }
 }
 

@@ -2,6 +2,7 @@
 //! hands them to the stage that writes pages.
 
 use super::plant_state::PlantState;
+use super::run_record::RunRecord;
 use crate::cache::{PAGE, RESULT, VerifiedFiles};
 use crate::detect::library;
 use crate::detect::robots::RobotList;
@@ -25,6 +26,8 @@ pub(crate) struct ReportedResult<'a> {
     state: PlantState,
     means: &'a Means,
     engine: &'a Engine,
+    /// Times, rates and memory of the run, where they are to stand on the page.
+    run: Vec<(String, String)>,
 }
 
 impl<'a> ReportedResult<'a> {
@@ -39,7 +42,14 @@ impl<'a> ReportedResult<'a> {
         engine: &'a Engine,
     ) -> Result<Self> {
         let (result, state) = (files.result()?, PlantState::read(files)?);
-        Ok(Self { out, files, result, state, means, engine })
+        Ok(Self { out, files, result, state, means, engine, run: Vec::new() })
+    }
+
+    /// The same with times, rates and memory of its run, as far as their record is there.
+    fn with_run(mut self) -> Self {
+        let record = RunRecord::of_result(self.out, self.files.digest());
+        self.run = record.map(|record| record.words()).unwrap_or_default();
+        self
     }
 
     /// The data of the page as JSON, without points.
@@ -50,11 +60,17 @@ impl<'a> ReportedResult<'a> {
         ReportPage::new(self.texts()?, self.scanners()).data(None)
     }
 
-    /// Writes the page and returns its path.
+    /// Writes the page beside the result and returns its path.
     ///
     /// # Errors
     /// A file that is missing or was changed, or the page cannot be written.
     pub(crate) fn write(&self) -> Result<PathBuf> {
+        let to = without_links(self.out, PAGE)?;
+        export::atomic::write(&to, self.html()?.as_bytes())?;
+        Ok(to)
+    }
+
+    fn html(&self) -> Result<String> {
         let mut page = ReportPage::new(self.texts()?, self.scanners());
         let loops = self.loops();
         for entry in &self.result.robots {
@@ -64,10 +80,7 @@ impl<'a> ReportedResult<'a> {
         let mut points = page.points();
         self.add_points(&mut points)?;
         self.add_spaces(&mut points)?;
-        let html = page.html(&points)?;
-        let to = without_links(self.out, PAGE)?;
-        export::atomic::write(&to, html.as_bytes())?;
-        Ok(to)
+        page.html(&points)
     }
 
     fn texts(&self) -> Result<PageTexts> {
@@ -84,6 +97,7 @@ impl<'a> ReportedResult<'a> {
             changes: changes.transpose()?,
             summary: manifest.summary.clone(),
             is_partial: manifest.partial,
+            run: self.run.clone(),
         })
     }
 
@@ -232,13 +246,29 @@ pub(crate) fn write_page(out: &Path, means: &Means, engine: &Engine) -> Result<P
     ReportedResult::open(out, &files, means, engine)?.write()
 }
 
+/// Writes a page of the result in `out` to any file, with times, rates and memory of its run.
+///
+/// # Errors
+/// There is no result, a file of it was changed, or the page cannot be written.
+pub(crate) fn write_page_with_run(
+    out: &Path,
+    to: &Path,
+    means: &Means,
+    engine: &Engine,
+) -> Result<()> {
+    let files = VerifiedFiles::open(out)?;
+    let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
+    let html = ReportedResult::open(out, &files, means, engine)?.with_run().html()?;
+    export::atomic::write(to, html.as_bytes())
+}
+
 /// The data of the page of the result in `out`, as JSON.
 ///
 /// # Errors
 /// There is no result, or a file of it was changed.
 pub(crate) fn page_data(out: &Path, means: &Means, engine: &Engine) -> Result<String> {
     let files = VerifiedFiles::open(out)?;
-    ReportedResult::open(out, &files, means, engine)?.data()
+    ReportedResult::open(out, &files, means, engine)?.with_run().data()
 }
 
 fn pose(at: &BasePose) -> Pose {

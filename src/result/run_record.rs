@@ -2,7 +2,7 @@
 //! store beside the result, so that the result itself stays the same bytes.
 
 use crate::cache::VerifiedFiles;
-use crate::engine::progress::StageReport;
+use crate::engine::progress::{StageReport, title};
 use crate::io::own_paths::without_links;
 use crate::job::{Means, Outcome, memory_words};
 use contract::{Error, Kind, Result};
@@ -112,7 +112,7 @@ impl RunRecord {
                 0 => format!("{:>7.1} s, {} items", stage.seconds, stage.n_items),
                 n => format!("{:>7.1} s, {n} points, {rate:.1} M points/s", stage.seconds),
             };
-            lines.push((format!("  {}", stage.name), words));
+            lines.push((format!("  {}", title(&stage.name)), words));
         }
         lines.extend(self.reused.iter().map(|piece| ("used again".into(), piece.clone())));
         lines

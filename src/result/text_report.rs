@@ -182,5 +182,7 @@ fn add_run(text: &mut String, result: &ResultFile, record: Option<&RunRecord>) {
         );
         return;
     };
-    record.words().iter().for_each(|(about, words)| line(text, about, words));
+    for (about, words) in record.words() {
+        let _ = writeln!(text, "  {about:<20} {words}");
+    }
 }

@@ -9,6 +9,26 @@ fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
     Some(seconds * (1.0 - share) / share)
 }
 
+/// What people are told that a stage does; programs get its name.
+pub(crate) fn title(name: &str) -> &str {
+    match name {
+        "digest" => "comparing inputs",
+        "robots" => "robot library",
+        "ingest" | "read" => "reading scans",
+        "store" => "storing points",
+        "surfaces" | "surface" => "floor and surfaces",
+        "fit" | "search" => "finding robots",
+        "join" => "adjusting scans",
+        "space" | "unknown" => "free space",
+        "segment" => "points of robots",
+        "write" => "labelling points",
+        "compare" => "comparing scans",
+        "list" | "verify" => "checking files",
+        "page" => "report page",
+        name => name,
+    }
+}
+
 /// Progress of a stage at one moment.
 pub(super) struct StageState<'a> {
     /// The amount that is done.

@@ -110,6 +110,32 @@ impl Canvas {
         self.pixels.fill_path(&circle, &paint, FillRule::Winding, Transform::identity(), None);
     }
 
+    /// Mixes a colour into a rectangle; corner and size in pixels.
+    pub(crate) fn shade(&mut self, [x, y]: [i64; 2], size: [i64; 2], color: Rgb, share: f64) {
+        for (u, v) in (0..size[0] * size[1]).map(|i| (x + i % size[0], y + i / size[0])) {
+            if let Some(pixel) = self.pixel(u, v) {
+                *pixel = opaque(blend([pixel.red(), pixel.green(), pixel.blue()], color, share));
+            }
+        }
+    }
+
+    /// Draws a circle, as far as it is within bounds (left, top, right, bottom); pixels.
+    pub(crate) fn ring(&mut self, [x, y]: [i64; 2], radius: f64, color: Rgb, bounds: [i64; 4]) {
+        // Steps of half a pixel leave no gap.
+        let n = (4.0 * std::f64::consts::PI * radius.clamp(0.0, 1e5)) as i64;
+        for i in 0..n {
+            let turn = i as f64 / n as f64 * std::f64::consts::TAU;
+            let [u, v] = [turn.cos(), turn.sin()].map(|part| (part * radius).round() as i64);
+            let (u, v) = (x + u, y + v);
+            // Dashes of eight pixels, so that no circle is taken for a wall.
+            let is_dash = (i / 16) % 3 != 2;
+            let is_in = u >= bounds[0] && v >= bounds[1] && u < bounds[2] && v < bounds[3];
+            if is_dash && is_in {
+                self.set(u, v, color);
+            }
+        }
+    }
+
     /// Writes text on a white background. The upper left corner of the first capital letter is at
     /// (`x`, `y`).
     pub fn text(&mut self, x: i64, y: i64, size: TextSize, color: Rgb, words: &str) {

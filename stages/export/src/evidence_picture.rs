@@ -17,7 +17,7 @@ const SIDE: i64 = 560;
 /// Height of a line, pixels.
 const LINE: i64 = 16;
 /// Left end and width of the bar that shows a joint's limits, pixels.
-const BAR: (i64, i64) = (190, 300);
+const BAR: (i64, i64) = (190, 240);
 /// Left end of the table of links, pixels.
 const LINKS: i64 = 700;
 /// Columns of that table: head, and right end, pixels.

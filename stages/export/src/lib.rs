@@ -81,7 +81,7 @@ pub use npy::{Element, NpyWriter, read_places};
 pub use pack::{Pack, Packed, PointColumns};
 pub use picture_pixels::PicturePixels;
 pub use places::NamedMap;
-pub use plan_picture::PlanPicture;
+pub use plan_picture::{PlanPicture, PlanRobot};
 pub use ply::{PLY, write_ply};
 pub use posture::JointWords;
 pub use record::{LasSettings, PROJECTION, Quantum, RawVlr, class_of};

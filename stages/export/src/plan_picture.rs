@@ -4,16 +4,20 @@ use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, robot_color};
 use crate::font::TextSize::{Body, Title};
 use contract::{Label, PointKind};
 use geometry::Aabb;
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
 
 /// Smallest cell, metres.
-const MIN_CELL: f64 = 0.05;
+const MIN_CELL: f64 = 0.02;
 /// Largest number of cells along a side; a larger plant gets larger cells.
 const MAX_SIDE: f64 = 2400.0;
 /// Smallest length of the longer side, pixels; cells are drawn larger to reach it.
 const MIN_PIXELS: usize = 900;
 /// Margin around the plan, pixels.
-const MARGIN: i64 = 24;
+const MARGIN: i64 = 48;
+/// Distances of grid lines, metres, and pixels that two of them are apart at least.
+const GRID: [f64; 8] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+const GRID_PIXELS: f64 = 90.0;
 
 /// Counts of points by ground cell. Workers count concurrently, since sums do not depend on order.
 #[derive(Debug)]
@@ -25,6 +29,19 @@ pub struct PlanPicture {
     width: usize,
     height: usize,
     cells: Vec<PlanCell>,
+}
+
+/// A robot in a plan; places are in the world frame, metres.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanRobot {
+    /// Its name.
+    pub name: String,
+    /// Its base.
+    pub at: [f64; 2],
+    /// How far from its base any part of it can be; 0 draws no circle.
+    pub reach: f64,
+    /// Points of its surface in the posture that was found, around which its outline runs.
+    pub body: Vec<[f64; 2]>,
 }
 
 #[derive(Debug, Default)]
@@ -89,13 +106,13 @@ impl PlanPicture {
         count.fetch_add(n, Relaxed);
     }
 
-    /// Draws the plan with robots (names and positions of bases) and scanners (names and
-    /// positions); world, metres.
+    /// Draws the plan with robots, their outlines and reach, and scanners (names and positions,
+    /// world, metres).
     #[must_use]
     pub fn draw(
         &self,
         title: &str,
-        robots: &[(String, [f64; 2])],
+        robots: &[PlanRobot],
         scanners: &[(String, [f64; 2])],
     ) -> Canvas {
         let zoom = (MIN_PIXELS / self.width.max(self.height)).clamp(1, 8) as i64;
@@ -115,30 +132,77 @@ impl PlanPicture {
             let x = MARGIN + ((p[0] - self.min[0]) / self.cell * zoom as f64) as i64;
             (x, 2 * MARGIN + h - 1 - ((p[1] - self.min[1]) / self.cell * zoom as f64) as i64)
         };
+        self.grid(&mut canvas, zoom, h);
+        for (i, robot) in robots.iter().enumerate() {
+            let radius = robot.reach / self.cell * zoom as f64;
+            let (x, y) = place(&robot.at);
+            let colour = robot_color(i);
+            canvas.ring([x, y], radius, colour, [MARGIN, 2 * MARGIN, MARGIN + w, 2 * MARGIN + h]);
+            self.outline(&mut canvas, zoom, &robot.body, blend(colour, INK, 0.6));
+        }
         for (name, at) in scanners {
             let (x, y) = place(at);
             canvas.disc(x, y, 5, WHITE);
             canvas.disc(x, y, 4, [200, 0, 60]);
             canvas.text(x + 8, y - 4, Body, [160, 0, 50], name);
         }
-        for (i, (name, at)) in robots.iter().enumerate() {
+        for (i, PlanRobot { name, at, .. }) in robots.iter().enumerate() {
             let (x, y) = place(at);
             canvas.disc(x, y, 5, WHITE);
             canvas.disc(x, y, 4, robot_color(i));
             canvas.text(x + 8, y - 8, Title, robot_color(i), name);
         }
         canvas.text(MARGIN, MARGIN / 2, Title, INK, title);
-        self.scale_bar(&mut canvas, zoom, 2 * MARGIN + h + 16);
+        self.scale_bar(&mut canvas, zoom, 2 * MARGIN + h + 32);
         canvas
+    }
+
+    /// Draws lines at round coordinates, with the coordinates beside them.
+    fn grid(&self, canvas: &mut Canvas, zoom: i64, h: i64) {
+        let pixels = zoom as f64 / self.cell;
+        let far = |step: &f64| step * pixels >= GRID_PIXELS;
+        let step = GRID.into_iter().find(far).unwrap_or(GRID[GRID.len() - 1]);
+        let side = [self.width, self.height].map(|n| n as f64 * self.cell);
+        for axis in 0..2 {
+            let first = (self.min[axis] / step).ceil();
+            let n = ((self.min[axis] + side[axis]) / step - first).floor() as i64;
+            for k in 0..=n {
+                let value = (first + k as f64) * step;
+                let at = ((value - self.min[axis]) * pixels) as i64;
+                let words = format!("{value}");
+                if axis == 0 {
+                    canvas.shade([MARGIN + at, 2 * MARGIN], [1, h], INK, LINE_SHARE);
+                    let left = MARGIN + at - Canvas::text_width(Body, &words) / 2;
+                    canvas.text(left, 2 * MARGIN + h + 5, Body, GREY, &words);
+                } else {
+                    let (y, w) = (2 * MARGIN + h - 1 - at, self.width as i64 * zoom);
+                    canvas.shade([MARGIN, y], [w, 1], INK, LINE_SHARE);
+                    canvas.text_to(MARGIN - 5, y - 4, Body, GREY, &words);
+                }
+            }
+        }
+    }
+
+    /// Draws the outline of points as cells that they fill, and the cells beside these.
+    fn outline(&self, canvas: &mut Canvas, zoom: i64, body: &[[f64; 2]], colour: Rgb) {
+        let cell =
+            |p: &[f64; 2]| [0, 1].map(|i| ((p[i] - self.min[i]) * self.per_metre).floor() as i64);
+        let beside = |[u, v]: [i64; 2]| (0..9).map(move |k| [u + k % 3 - 1, v + k / 3 - 1]);
+        let full: BTreeSet<[i64; 2]> = body.iter().map(cell).flat_map(beside).collect();
+        let (w, h) = (self.width as i64, self.height as i64);
+        for &[u, v] in full.iter().filter(|[u, v]| (0..w).contains(u) && (0..h).contains(v)) {
+            let edges = [[u - 1, v], [u + 1, v], [u, v - 1], [u, v + 1]];
+            if edges.iter().any(|side| !full.contains(side)) {
+                let y = 2 * MARGIN + (h - 1 - v) * zoom;
+                canvas.fill(MARGIN + u * zoom, y, zoom, zoom, colour);
+            }
+        }
     }
 
     /// Draws a scale bar of a round length, about a quarter of the plan.
     fn scale_bar(&self, canvas: &mut Canvas, zoom: i64, y: i64) {
         let quarter = self.width as f64 * self.cell / 4.0;
-        let metres = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0]
-            .into_iter()
-            .rfind(|m| *m <= quarter)
-            .unwrap_or(0.5);
+        let metres = GRID.into_iter().rfind(|m| *m <= quarter).unwrap_or(0.5);
         let pixels = (metres / self.cell * zoom as f64) as i64;
         canvas.fill(MARGIN, y, pixels, 3, INK);
         canvas.text(MARGIN, y + 8, Body, INK, &format!("{metres} m"));
@@ -148,6 +212,8 @@ impl PlanPicture {
             ("uncertain", UNCERTAIN),
             ("scanner", [200, 0, 60]),
         ];
+        let reach = "circles: reach, lines: outlines of robots; grid in metres";
+        canvas.text(MARGIN, y + 26, Body, INK, reach);
         let mut x = MARGIN + pixels.max(48) + 24;
         for (name, color) in legend {
             canvas.fill(x, y + 7, 10, 10, color);
@@ -176,6 +242,9 @@ impl PlanPicture {
     }
 }
 
+/// Colour of coordinates, and how dark grid lines make what they lie on.
+const GREY: Rgb = [90, 96, 104];
+const LINE_SHARE: f64 = 0.25;
 const FLOOR: Rgb = [232, 234, 230];
 const FIXED: Rgb = [120, 126, 134];
 const UNCERTAIN: Rgb = [236, 190, 60];

@@ -118,7 +118,12 @@ fn pictures_show_robots_where_they_stand() {
     std::fs::create_dir_all(&out).expect("a folder");
     let plan = plan.draw(
         "plant.las",
-        &[("R1".into(), [400_003.0, 5_000_002.0])],
+        &[PlanRobot {
+            name: "R1".into(),
+            at: [400_003.0, 5_000_002.0],
+            reach: 1.5,
+            body: vec![[400_003.2, 5_000_002.1], [400_003.4, 5_000_002.1]],
+        }],
         &[("scan_01".into(), [400_007.0, 5_000_004.0])],
     );
     plan.write(&out.join("plan.png")).expect("writes");

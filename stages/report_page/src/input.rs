@@ -19,6 +19,9 @@ pub struct PageTexts {
     pub summary: String,
     /// Whether the run left something out.
     pub is_partial: bool,
+    /// Times, rates and memory of the run, each with what it is about. They differ from run to run,
+    /// so a page that is a file of the result has none.
+    pub run: Vec<(String, String)>,
 }
 
 /// A point of the result.

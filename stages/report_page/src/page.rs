@@ -135,12 +135,13 @@ impl ReportPage {
         let scanners = json(&self.scanners)?;
         let joined = format!(
             "{{\"schema\":\"{PAGE_SCHEMA}\",\"title\":{},\"program\":{},\"summary\":{},\
-             \"is_partial\":{},\"n_points\":{counts},\"scanners\":{scanners},\"result\":{},\
+             \"is_partial\":{},\"run\":{},\"n_points\":{counts},\"scanners\":{scanners},\"result\":{},\
              \"changes\":{changes}",
             json(&self.texts.title)?,
             json(&self.texts.program)?,
             json(&self.texts.summary)?,
             self.texts.is_partial,
+            json(&self.texts.run)?,
             embedded(&self.texts.result, "result.json")?,
         );
         embedded(&format!("{joined}}}"), "the page's data")

@@ -68,8 +68,8 @@ async function start() {
   sectionPanel(scene);
   jointPanel(scene, standing[0] || null);
   scene.view.chosen = null;
-  const does = { home: () => scene.view.home(), top: () => scene.view.turnTo(-Math.PI / 2, 1.5),
-    front: () => scene.view.turnTo(-Math.PI / 2, 0.15), in: () => scene.view.zoom(0.75),
+  const does = { home: () => scene.view.home(), top: () => scene.view.turnTo(-Math.PI / 2, 1.5, scene.view.isHome),
+    front: () => scene.view.turnTo(-Math.PI / 2, 0.15, scene.view.isHome), in: () => scene.view.zoom(0.75),
     out: () => scene.view.zoom(1.33) };
   $("tools").addEventListener("click", (e) => does[e.target.dataset.do]?.());
 }

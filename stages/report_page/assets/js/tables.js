@@ -127,7 +127,8 @@ function robotBody(scene, robot) {
       : null],
     ["Space within reach", entry.space ? `${fixed(entry.space.free_m3, 1)} m³ free, ${
       fixed(entry.space.unknown_m3, 1)} m³ unseen` : "not computed"],
-    ["Files", robot.body ? el("code", {}, `robots/${entry.id}/robot.urdf`) : null],
+    ["Files", robot.body ? [el("code", {}, `robots/${entry.id}/robot.urdf`), ", ",
+      el("a", { href: `pictures/${entry.id}_evidence.png` }, "residuals in colour, by views")] : null],
   ];
   const why = entry.reasons?.length
     ? [el("h4", {}, entry.verdict === "trusted" ? "Notes" : "Why"),
@@ -308,6 +309,12 @@ function runSection() {
       el("div", {}, el("h3", {}, "Stages"), table("What went into each stage, and what came out",
         ["Stage", "What", "#In", "#Out"], stages.map((s) => el("tr", {}, el("th", { scope: "row" }, s.name),
           cell(said[s.name] || ""), cell(many(s.n_in), "num"), cell(many(s.n_out), "num")))))),
+    data.run.length ? [el("h3", {}, "Times, rates and memory"), table("What the run took",
+      ["Of", "What"], data.run.map(([about, words]) => el("tr", {},
+        el("th", { scope: "row" }, about.trim()), cell(words.trim()))))]
+      : el("p", {}, "Times, rates, memory and what was used again differ from run to run: ",
+        el("code", {}, "stillpoint report OUT"), " prints them, and ",
+        el("code", {}, "report OUT --page FILE"), " makes a page with them."),
     data.summary ? el("details", {}, el("summary", {}, "Summary as on the terminal"),
       el("pre", {}, data.summary.split("\n").map((line) => [line, el("br")]))) : null,
   ].flat().filter(Boolean));

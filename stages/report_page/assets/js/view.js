@@ -6,6 +6,8 @@ const FRAME_MS = 45;
 const PAUSE_MS = 160;
 /** Time of a piece while the view rests, so that it stays ready to move, milliseconds. */
 const REST_MS = 60;
+/** Share of the picture's width and height that the plant fills at first. */
+const SEEN_SHARE = 0.94;
 /** Fewest points of a frame. */
 const LEAST_POINTS = 8_000;
 
@@ -17,7 +19,8 @@ class View {
     this.measure();
     this.addLabels();
     this.listen();
-    new ResizeObserver(() => this.wake()).observe(this.canvas);
+    // Who has not moved the view yet sees all of the plant, also in a window made narrower.
+    new ResizeObserver(() => this.isHome ? this.home() : this.wake()).observe(this.canvas);
     this.home();
   }
 
@@ -61,23 +64,36 @@ class View {
     return top < this.core[1][2] - 0.3 ? top : this.bounds[1][2];
   }
 
+  /** All of the plant from its corner, as near as its corners allow. */
   home() {
-    const [low, high] = this.core;
-    this.target = low.map((v, i) => (v + high[i]) / 2);
-    this.target[2] = low[2] + 0.25 * (high[2] - low[2]);
-    const aspect = Math.min(1, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight) * 0.8);
-    this.away = 0.88 * Math.hypot(high[0] - low[0], high[1] - low[1]) / aspect + 1;
-    [this.yaw, this.pitch] = [-0.9, 0.72];
-    this.wake();
+    this.turnTo(-0.9, 0.72, true);
+    this.isHome = true;
   }
 
-  turnTo(yaw, pitch) {
+  /** Looks from another side; `isWhole` brings all of the plant into the picture. */
+  turnTo(yaw, pitch, isWhole = false) {
     [this.yaw, this.pitch] = [yaw, pitch];
+    this.isHome = false;
+    if (isWhole) {
+      const [low, high] = [this.core[0], [...this.core[1]]];
+      high[2] = Math.max(low[2] + 0.1, Math.min(high[2], this.ceiling()));
+      this.target = low.map((v, i) => (v + high[i]) / 2);
+      const { right, up, back } = this.camera();
+      const tangent = Math.tan(FIELD / 2) * SEEN_SHARE;
+      const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
+      const needed = boxLines(low, high).map((corner) => {
+        const to = minus(corner, this.target);
+        return dot(to, back) + Math.max(Math.abs(dot(to, right)) / Math.max(0.1, aspect),
+          Math.abs(dot(to, up))) / tangent;
+      });
+      this.away = Math.max(1, ...needed);
+    }
     this.wake();
   }
 
   /** Looks at a robot. */
   focus(robot) {
+    this.isHome = false;
     this.chosen = robot;
     const at = robot.tree ? robot.poses.map((m) => m.slice(12, 15)) : [robot.base.slice(12, 15)];
     const low = [0, 1, 2].map((k) => Math.min(...at.map((p) => p[k])));
@@ -261,6 +277,7 @@ class View {
 
   /** Moves the view by pixels. */
   pan(dx, dy) {
+    this.isHome = false;
     const { right, up } = this.camera();
     const by = this.away / this.focal(this.canvas.clientHeight);
     this.target = plus(plus(this.target, right, -dx * by), up, dy * by);
@@ -268,12 +285,14 @@ class View {
   }
 
   turn(dx, dy) {
+    this.isHome = false;
     this.yaw -= dx * 0.006;
     this.pitch = clamp(this.pitch + dy * 0.006, -1.5, 1.5);
     this.wake();
   }
 
   zoom(by) {
+    this.isHome &&= by === 1;
     this.away = clamp(this.away * by, 0.3, 800);
     this.wake();
   }
@@ -303,6 +322,7 @@ class View {
 
   /** Turns about the place at a pixel, on the level that the view turns about. */
   pivot(x, y) {
+    this.isHome = false;
     const { eye, way } = this.ray(x, y);
     const robot = this.robotAt(x, y);
     if (robot) return this.focus(robot);
@@ -377,8 +397,8 @@ class View {
     else if (key === "+" || key === "=") this.zoom(0.85);
     else if (key === "-") this.zoom(1.18);
     else if (key === "r") this.home();
-    else if (key === "t") this.turnTo(-Math.PI / 2, 1.5);
-    else if (key === "f") this.turnTo(-Math.PI / 2, 0.15);
+    else if (key === "t") this.turnTo(-Math.PI / 2, 1.5, this.isHome);
+    else if (key === "f") this.turnTo(-Math.PI / 2, 0.15, this.isHome);
     else if (key === "n" || key === "p") this.onStep?.(key === "n" ? 1 : -1);
     else return;
     e.preventDefault();

@@ -18,6 +18,7 @@ fn texts(name: &str) -> PageTexts {
         changes: Some(format!("{{\"base\": {}}}", serde_json::json!(name))),
         summary: name.into(),
         is_partial: false,
+        run: vec![("memory".into(), name.into())],
     }
 }
 
