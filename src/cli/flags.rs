@@ -138,6 +138,10 @@ pub(super) struct RunFlags {
 pub(super) struct PlanFlags {
     #[command(flatten)]
     pub(super) run: RunFlags,
+    /// Also estimate the job on N machines with a shared disk and --threads cores each, as `shards`
+    /// divides it: time, machine hours, storage and transfers
+    #[arg(long, value_name = "N")]
+    pub(super) nodes: Option<std::num::NonZeroUsize>,
     /// Print JSON
     #[arg(long)]
     pub(super) json: bool,

@@ -5,7 +5,7 @@ use super::flags::{PlanFlags, RescanFlags, RunFlags, present};
 use super::say::Say;
 use super::{exit, keep_going};
 use crate::engine::Engine;
-use crate::estimate::{estimate, with_missing};
+use crate::estimate::{estimate_on, with_missing};
 use crate::eval::demo::peak_memory;
 use crate::job::{Job, Means, Outcome};
 use crate::rescan::{self, Cell, Frame, RescanRequest};
@@ -13,6 +13,7 @@ use crate::result::run_record::{MeasuredRun, RunRecord};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
 use std::fmt::Write as _;
+use std::num::NonZeroUsize;
 use std::time::Instant;
 
 pub(super) fn run(flags: &RunFlags, common: &Common, say: &Say) -> Result<u8> {
@@ -38,7 +39,7 @@ pub(super) fn ended(
 
 pub(super) fn plan(flags: &PlanFlags, common: &Common, say: &Say) -> Result<u8> {
     let (job, engine) = job(&flags.run, common)?;
-    let estimate = estimate(&job, &engine)?;
+    let estimate = estimate_on(&job, flags.nodes.map(NonZeroUsize::get), &engine)?;
     if flags.json {
         say.result(&super::say::json(&estimate)?);
     } else {

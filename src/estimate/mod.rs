@@ -2,9 +2,11 @@
 //! the points tells how much there is to search.
 
 mod expected_regions;
+mod nodes;
 mod rates;
 mod search_time;
 pub(crate) mod shard_costs;
+mod sizes;
 
 use crate::cache::{Digests, OutputDir};
 use crate::detect::library;
@@ -17,14 +19,16 @@ use contract::{Error, Input, Kind, Result};
 use ingest::{Before, Sources};
 use rates::{COPC, INGEST, LOAD, PAGE, REST, SPREAD};
 use serde::Serialize;
+use shard_costs::ShardCosts;
+use sizes::{
+    LABEL_BYTES, MODEL_BYTES, POINT_BYTES, PROGRAM_BYTES, SCAN_BYTES, SCANS, STORE_BYTES, points,
+};
 use std::path::Path;
 
 pub use expected_regions::{ExpectedRegion, ExpectedRegions};
+use nodes::EstimatedJob;
+pub use nodes::{NodePhase, NodePlan};
 
-/// Size of a point in the store, with its share of catalogue and checksums, bytes.
-const STORE_BYTES: u64 = 18;
-/// Size of a point's labels (kind, robot, link), bytes.
-const LABEL_BYTES: u64 = 5;
 /// Ratio of compressed to plain size of clouds.
 const COMPRESSED: f64 = 0.35;
 /// Size of a point in a cloud, without and with colour, bytes.
@@ -34,24 +38,11 @@ const COPC_BYTES: u64 = 40;
 /// Largest size of the page of a result, and its share for each point of a small one, bytes.
 const PAGE_BYTES: u64 = 15 << 20;
 const PAGE_POINT_BYTES: u64 = 4;
-/// Estimated size of a point in a text file, bytes.
-const TEXT_BYTES: u64 = 45;
 /// Size of pictures, cached models, voxels and lists for each model of the library, bytes: 7 to 11
 /// MB were measured in halls with up to two robots, and large plants have more robots.
 const EXTRA_BYTES: u64 = 16 << 20;
 /// Overhead of a spatial tile: header and the unused part of its last disk block, bytes.
 const TILE_BYTES: u64 = 4096;
-/// Memory of the program with an open library, bytes.
-const PROGRAM_BYTES: u64 = 160 << 20;
-/// Memory of each loaded model, bytes.
-const MODEL_BYTES: u64 = 24 << 20;
-/// Memory of each point until the budget is full, bytes.
-const POINT_BYTES: u64 = 40;
-/// Memory of each scan while a robot is searched, independent of the budget, bytes: a billion
-/// points of 20 scans took 0.8 GiB with 512 MiB allowed.
-const SCAN_BYTES: u64 = 28 << 20;
-/// Most scans that see one place.
-const SCANS: u64 = 24;
 
 /// Estimated memory, disk and time of a job.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -82,13 +73,24 @@ pub struct Estimate {
     pub kept_inputs: [usize; 2],
     /// Whether nothing has changed, so that the run has nothing to do.
     pub unchanged: bool,
+    /// The same job on several machines, if that was asked.
+    pub nodes: Option<NodePlan>,
 }
 
-/// Estimates a job.
+/// Estimates a job on one machine.
 ///
 /// # Errors
 /// Inputs or a library that cannot be opened.
 pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
+    estimate_on(job, None, engine)
+}
+
+/// Estimates a job, also on a number of machines with a shared disk, each with as many cores as the
+/// job has threads.
+///
+/// # Errors
+/// Inputs or a library that cannot be opened.
+pub fn estimate_on(job: &Job, nodes: Option<usize>, engine: &Engine) -> Result<Estimate> {
     job.check_places()?;
     let settings = &job.means.settings;
     // Without an earlier run there are no pieces to use again, and no input need be digested.
@@ -102,6 +104,20 @@ pub fn estimate(job: &Job, engine: &Engine) -> Result<Estimate> {
         (estimate.store_bytes, estimate.output_bytes, estimate.seconds) = (0, 0, [0.5; 2]);
     } else {
         estimate.look(job, &sources, engine)?;
+        let costs = ShardCosts::new(&sources, &job.means, estimate.n_models);
+        let has_tiles = |input: &Input| has_tiles(input, &sources);
+        estimate.nodes = nodes.map(|nodes| {
+            let places = [nodes.max(1), job.means.n_threads];
+            let expected = estimate.expected.as_ref();
+            let estimated = EstimatedJob {
+                n_points: estimate.n_points,
+                n_models: estimate.n_models,
+                store_bytes: estimate.store_bytes,
+                output_bytes: estimate.output_bytes,
+                regions: expected.map_or(&[], |expected| &expected.regions),
+            };
+            NodePlan::new(&estimated, &sources, &costs, places, has_tiles)
+        });
     }
     Ok(Estimate { unchanged, ..estimate })
 }
@@ -213,6 +229,7 @@ impl Estimate {
             expected: None,
             kept_inputs: [n_kept, sources.inputs.len()],
             unchanged: false,
+            nodes: None,
         }
     }
 
@@ -275,15 +292,9 @@ impl std::fmt::Display for Estimate {
             let area: f64 = expected.regions.iter().map(|r| r.size[0] * r.size[1]).sum();
             writeln!(f, "search    {regions} of {area:.0} m² in all, as far as a glance tells")?;
         }
-        write!(f, "kept      tiles of {kept} of {inputs}")
+        write!(f, "kept      tiles of {kept} of {inputs}")?;
+        self.nodes.iter().try_for_each(|nodes| write!(f, "\n{nodes}"))
     }
-}
-
-/// Number of points of an input: as it states, else from its length.
-fn points(sources: &Sources, input: &Input) -> u64 {
-    let scans = sources.scans.iter().filter(|s| s.input == input.id);
-    let in_scans: Option<u64> = scans.map(|s| s.stated_points).sum();
-    sources.n_stated(input.id).or(in_scans).unwrap_or(input.n_bytes / TEXT_BYTES)
 }
 
 /// Free space on the disk of a folder that exists or will be created, bytes.

@@ -5,11 +5,13 @@ use super::rates::{AREA, REGION, SURFACE};
 
 /// Processor time of the search, seconds.
 pub(super) fn seconds(expected: &ExpectedRegions, n_models: usize) -> f64 {
-    let of_region = |r: &ExpectedRegion| {
-        let (area, surface) = (r.size[0] * r.size[1], r.n_voxels as f64 / 1000.0);
-        REGION + AREA * area * n_models as f64 + SURFACE * surface
-    };
-    expected.regions.iter().map(of_region).sum()
+    expected.regions.iter().map(|region| of_region(region, n_models)).sum()
+}
+
+/// Processor time of the search of one region, seconds.
+pub(super) fn of_region(region: &ExpectedRegion, n_models: usize) -> f64 {
+    let (area, surface) = (region.size[0] * region.size[1], region.n_voxels as f64 / 1000.0);
+    REGION + AREA * area * n_models as f64 + SURFACE * surface
 }
 
 #[cfg(test)]

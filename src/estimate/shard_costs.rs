@@ -1,14 +1,18 @@
 //! What single shards of a job will take, from the same rates as the estimate of the whole job.
 
 use super::rates::{AREA, INGEST, PAGE, REGION, REST, SURFACE};
-use super::{LABEL_BYTES, MODEL_BYTES, POINT_BYTES, PROGRAM_BYTES, SCAN_BYTES, SCANS, points};
+use super::sizes::{
+    LABEL_BYTES, MODEL_BYTES, POINT_BYTES, PROGRAM_BYTES, SCAN_BYTES, SCANS, points,
+};
 use crate::job::Means;
 use contract::{Cluster, Input, Region};
 use ingest::Sources;
 
-/// Processor seconds of a shard before its own work: the program starts, and opens all inputs and
-/// the models of the library.
+/// Processor seconds of a shard before its own work: the program starts, and opens the models of
+/// the library.
 const START: f64 = 0.3;
+/// Processor seconds of each input that a shard opens; each opens all of them.
+const OPEN: f64 = 0.0075;
 /// Points per second that one thread copies from the pieces of inputs to files of the result.
 const JOIN: f64 = 20e6;
 /// Points per second of one thread that labels an input and writes its piece.
@@ -43,7 +47,12 @@ impl<'a> ShardCosts<'a> {
         let least = base + SCAN_BYTES * n_scans;
         let memory = base.saturating_add(n_points.saturating_mul(POINT_BYTES));
         let memory_bytes = memory.min(self.means.memory_bytes.max(least));
-        ShardCost { seconds: START + seconds, memory_bytes }
+        ShardCost { seconds: self.start() + seconds, memory_bytes }
+    }
+
+    /// Processor seconds of a shard before its own work.
+    pub(super) fn start(&self) -> f64 {
+        START + OPEN * self.sources.inputs.len() as f64
     }
 
     fn all_points(&self) -> u64 {

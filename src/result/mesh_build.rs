@@ -23,8 +23,8 @@ const TRIES: usize = 8;
 /// Smallest and largest factor from one bound to the next.
 const FACTORS: [f64; 2] = [1.15, 3.0];
 
-/// Distance beyond which a point is put into a box, as a share of the bound. The rest is left to the
-/// noise of beams, so that hardly any true surface is farther than the bound.
+/// Distance beyond which a point is put into a box, as a share of the bound. The rest is left to
+/// the noise of beams, so that hardly any true surface is farther than the bound.
 const HELD: f64 = 0.75;
 
 /// Least share of the way from one tried bound to the other that the next one keeps from both.

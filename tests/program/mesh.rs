@@ -2,6 +2,9 @@
 //! for any number of threads, budgets of triangles, and requests that cannot be met.
 
 use crate::common::palletiser;
+use glamx::Vec3 as Vector;
+use parry3d::query::PointQuery;
+use parry3d::shape::ConvexPolyhedron;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -75,13 +78,13 @@ fn of_obj(text: &str) -> Vec<SurfaceMesh> {
     out
 }
 
-/// Whether a place lies in a convex piece, to the rounding of its file.
+/// Whether a place lies in a convex piece, to the rounding of its file. The distance from the hull
+/// of its corners is asked, since rounding turns planes of slivers.
 fn holds(piece: &SurfaceMesh, at: [f64; 3]) -> bool {
-    piece.triangles.iter().all(|t| {
-        let [a, b, c] = piece.corners(*t).map(geometry::Point::from);
-        let normal = (b - a).cross(&(c - a));
-        normal.dot(&(geometry::Point::from(at) - a)) <= 1e-4 * normal.norm()
-    })
+    let from = |v: &[f64; 3]| [0, 1, 2].map(|i| (v[i] - at[i]) as f32);
+    let corners: Vec<Vector> = piece.vertices.iter().map(|v| Vector::from_array(from(v))).collect();
+    let hull = ConvexPolyhedron::from_convex_hull(&corners).expect("a body");
+    hull.distance_to_local_point(Vector::ZERO, true) <= 2e-4
 }
 
 #[test]

@@ -189,7 +189,8 @@ fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Val
     let gone = things.iter().find(|t| t["change"] == "gone").expect("a thing that is gone");
     let bound = |k: usize, i: usize| gone["then"][k][i].as_f64().expect("metres");
     // Points beside the bounds may belong to the floor and to neighbours.
-    let is_inside = |at: &[f64]| (0..3).all(|i| at[i] > bound(0, i) + 0.05 && at[i] < bound(1, i));
+    let is_inside =
+        |at: &[f64]| (0..3).all(|i| at[i] > bound(0, i) + 0.05 && at[i] < bound(1, i) - 0.05);
     let meshed = |name: &str| {
         let folder = export(name, &["mesh", "--mesh-format", "obj"]).join("mesh");
         let text = std::fs::read_to_string(folder.join("fixed.obj")).expect("a mesh");
@@ -197,7 +198,8 @@ fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Val
             line.split(' ').map(|v| v.parse().expect("metres")).collect()
         };
         let corners = text.lines().filter_map(|line| line.strip_prefix("v ")).map(corner);
-        let n = corners.filter(|at| is_inside(at)).count();
+        let inside: Vec<Vec<f64>> = corners.filter(|at| is_inside(at)).collect();
+        let n = inside.len();
         let report = std::fs::read_to_string(folder.join("mesh.json")).expect("a report");
         let report: serde_json::Value = serde_json::from_str(&report).expect("it parses");
         (n, report["points"].as_u64().expect("a number"))

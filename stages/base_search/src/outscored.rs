@@ -1,5 +1,5 @@
-//! What models of a library have to do with one another: at a place where one model's base and first
-//! link score far higher than another's, the other one is not looked at more closely.
+//! What models of a library have to do with one another: at a place where one model's base and
+//! first link score far higher than another's, the other one is not looked at more closely.
 
 use geometry::Vector;
 use std::collections::HashMap;

@@ -4,6 +4,7 @@
 mod binary;
 mod body;
 mod fields;
+mod file;
 mod header;
 mod lzf;
 mod packed;
@@ -27,9 +28,9 @@ use crate::reader::{
 use crate::sampling;
 use crate::settings::Settings;
 use crate::units::{Choice, Units};
-use body::{Body, CloudSeed};
+use body::{CloudSeed, RecordBody};
 use contract::{Format, Result};
-use fields::Fields;
+use file::{CloudFile, CloudPart};
 use std::path::Path;
 
 /// Number of runs of records that are looked at, and of records of each.
@@ -38,28 +39,6 @@ const RUN: usize = 64;
 /// Share of the records looked at that lie at the origin of the file from which on these are beams
 /// without return. A single one may have been measured.
 const NO_RETURNS: f64 = 0.005;
-
-/// One scan of the file.
-struct CloudPart {
-    body: Body,
-    fields: Fields,
-    n_records: u64,
-    frame: FileFrame,
-    oddities: Oddities,
-}
-
-/// An open file.
-struct CloudFile {
-    format: Format,
-    map: Mapped,
-    parts: Vec<CloudPart>,
-    masks: Vec<MaskSeed>,
-    scans: Vec<ScanSeed>,
-    units: Units,
-    metres: [f64; 3],
-    strip_points: usize,
-    max_range: f64,
-}
 
 /// Opens a file of one of these formats. All lines of text are counted, since only so places are
 /// known.
@@ -75,7 +54,7 @@ pub(crate) fn open(path: &Path, format: Format, settings: &Settings) -> Result<B
         _ => text_file::open(path, TextKind::Xyz)?,
     };
     for seed in &mut seeds {
-        if let (Some(uncounted), Body::Text(body)) = (seed.uncounted, &mut seed.body) {
+        if let (Some(uncounted), RecordBody::Text(body)) = (seed.uncounted, &mut seed.body) {
             text_file::announced(path, uncounted, seed.n_records, body)?;
         }
     }
@@ -137,11 +116,6 @@ impl CloudFile {
         Ok(())
     }
 
-    #[inline]
-    fn in_metres(&self, p: [f64; 3]) -> [f64; 3] {
-        [p[0] * self.metres[0], p[1] * self.metres[1], p[2] * self.metres[2]]
-    }
-
     /// The valid points among `n` records of a scan from a place on, with their places.
     fn points_of(&self, scan: usize, from: u64, n: usize) -> Result<Vec<(u64, [f32; 3])>> {
         let part = &self.parts[scan];
@@ -151,16 +125,6 @@ impl CloudFile {
             Some((place, p.1.map(|v| v as f32)))
         });
         Ok(valid.collect())
-    }
-
-    /// The world and scan coordinates of a record, metres; `None` where it is out of range or a
-    /// beam without return.
-    #[inline]
-    fn valid(&self, part: &CloudPart, xyz: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
-        let world = self.in_metres(xyz);
-        let p = part.frame.scan_from_file(world);
-        let is_good = p.iter().all(|v| v.abs() <= self.max_range) && !part.frame.is_no_return(p);
-        is_good.then_some((world, p))
     }
 
     /// First and last place of a scan.
@@ -210,7 +174,7 @@ impl Reader for CloudFile {
     fn window_starts(&self, scan: usize, sample: WindowSample) -> Option<Vec<u64>> {
         // A window is asked for by its place alone, which tells no scans apart.
         let part = self.parts.get(scan).filter(|_| self.parts.len() == 1)?;
-        if let Body::Packed(_) = part.body {
+        if let RecordBody::Packed(_) = part.body {
             return None;
         }
         let n = part.n_records;
@@ -232,7 +196,7 @@ impl Reader for CloudFile {
             self.parts.iter().for_each(|part| part.oddities.clear());
         }
         if let [part] = &self.parts[..]
-            && let Body::Packed(body) = &part.body
+            && let RecordBody::Packed(body) = &part.body
         {
             return Ok(FileReading::Straight(Box::new(strips::PackedStrips::new(
                 self, body, want,
@@ -288,9 +252,9 @@ impl Reader for CloudFile {
         let mut facts = vec![("records".to_owned(), n_records.to_string())];
         if let Some(part) = self.parts.first() {
             let stored = match &part.body {
-                Body::Text(body) => format!("text of {} columns", body.n_columns),
-                Body::Binary(body) => format!("{} bytes each", body.stride),
-                Body::Packed(_) => "compressed".into(),
+                RecordBody::Text(body) => format!("text of {} columns", body.n_columns),
+                RecordBody::Binary(body) => format!("{} bytes each", body.stride),
+                RecordBody::Packed(_) => "compressed".into(),
             };
             facts.push(("stored".into(), stored));
             let mut attributes = vec!["coordinates"];

@@ -1,5 +1,5 @@
-//! Reads point files (E57, PTX, LAS, LAZ, PTS, text, PLY, PCD) as strips of points. No other crate knows these formats,
-//! and this crate knows nothing of what the points show.
+//! Reads point files (E57, PTX, LAS, LAZ, PTS, text, PLY, PCD) as strips of points. No other crate
+//! knows these formats, and this crate knows nothing of what the points show.
 //!
 //! # Example
 //! ```

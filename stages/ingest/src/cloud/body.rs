@@ -1,16 +1,16 @@
 //! The records of a scan, in whichever way they are stored.
 
 use super::binary::BinaryBody;
-use super::fields::{Fields, Slots};
+use super::fields::{CloudFields, Slots};
 use super::packed::PackedBody;
 use super::text_body::{STRETCH, TextBody};
 use crate::reader::Extent;
-use contract::{Error, Result};
+use contract::Result;
 use geometry::Pose;
 
 /// How the records of a scan are stored.
 #[derive(Debug)]
-pub(super) enum Body {
+pub(super) enum RecordBody {
     Text(TextBody),
     Binary(BinaryBody),
     Packed(PackedBody),
@@ -19,8 +19,8 @@ pub(super) enum Body {
 /// A scan of a file as its header states it.
 #[derive(Debug)]
 pub(super) struct CloudSeed {
-    pub(super) body: Body,
-    pub(super) fields: Fields,
+    pub(super) body: RecordBody,
+    pub(super) fields: CloudFields,
     pub(super) n_records: u64,
     /// Name of the scan; `None` for that of the file.
     pub(super) name: Option<String>,
@@ -33,20 +33,13 @@ pub(super) struct CloudSeed {
 }
 
 impl CloudSeed {
-    pub(super) fn new(body: Body, fields: Fields, n_records: u64) -> Self {
+    pub(super) fn new(body: RecordBody, fields: CloudFields, n_records: u64) -> Self {
         let notes = Vec::new();
         Self { body, fields, n_records, name: None, pose: None, notes, uncounted: None }
     }
 }
 
-/// The error of a file that holds fewer points than its header announces.
-pub(super) fn too_short(n: u64) -> Error {
-    Error::bad_input(format!("file is too short for the announced points, \"{n}\""))
-        .at("header")
-        .hint("the file is truncated or its header is wrong: copy or export it again")
-}
-
-impl Body {
+impl RecordBody {
     /// Up to `n` of all `n_records` records from the `first` on.
     pub(super) fn records(
         &self,

@@ -36,7 +36,7 @@ pub(super) enum CloudColor {
 
 /// What the columns of a file hold.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Fields {
+pub(super) struct CloudFields {
     pub(super) xyz: [usize; 3],
     pub(super) intensity: Option<usize>,
     pub(super) color: CloudColor,
@@ -44,7 +44,7 @@ pub(super) struct Fields {
     pub(super) span: Span,
 }
 
-impl Fields {
+impl CloudFields {
     /// Coordinates in these columns, and nothing else.
     pub(super) fn plain(xyz: [usize; 3]) -> Self {
         Self { xyz, intensity: None, color: CloudColor::None, span: SPANS[0] }
@@ -182,9 +182,9 @@ fn plain(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn named(names: &str) -> Option<Fields> {
+    fn named(names: &str) -> Option<CloudFields> {
         let names = names.split(' ').enumerate().map(|(i, name)| (name.to_owned(), i));
-        Fields::by_names(&names.collect::<Vec<_>>())
+        CloudFields::by_names(&names.collect::<Vec<_>>())
     }
 
     #[test]
@@ -201,23 +201,23 @@ mod tests {
 
     #[test]
     fn columns_without_names_are_known_by_their_values() {
-        let of = |record: &[f64]| Fields::by_number(record.len(), &[record.to_vec()]);
+        let of = |record: &[f64]| CloudFields::by_number(record.len(), &[record.to_vec()]);
         let color =
             |first| CloudColor::Channels { columns: [first, first + 1, first + 2], most: 255.0 };
         assert_eq!(of(&[1.0, 2.0, 3.0, 0.5]).intensity, Some(3));
         assert_eq!(of(&[1.0, 2.0, 3.0, 4.0, 5.0, 255.0]).color, color(3));
         // Normals are no colour.
-        assert_eq!(of(&[1.0, 2.0, 3.0, 0.0, 0.6, 0.8]), Fields::plain([0, 1, 2]));
+        assert_eq!(of(&[1.0, 2.0, 3.0, 0.0, 0.6, 0.8]), CloudFields::plain([0, 1, 2]));
         let pts = of(&[1.0, 2.0, 3.0, -1613.0, 52.0, 70.0, 64.0]);
         assert_eq!((pts.intensity, pts.color), (Some(3), color(4)));
         let colored = of(&[1.0, 2.0, 3.0, 52.0, 70.0, 64.0, 0.25]);
         assert_eq!((colored.intensity, colored.color), (None, color(3)));
-        assert_eq!(of(&[1.0; 5]), Fields::plain([0, 1, 2]));
+        assert_eq!(of(&[1.0; 5]), CloudFields::plain([0, 1, 2]));
     }
 
     #[test]
     fn values_become_sixteen_bits() {
-        let mut fields = Fields::by_number(7, &[vec![0.0; 7]]);
+        let mut fields = CloudFields::by_number(7, &[vec![0.0; 7]]);
         let record = |i: f64, c: f64| [0.0, 0.0, 0.0, i, c, c, c];
         (fields, _) = fields.suited(&[record(-2000.0, 255.0), record(2000.0, 0.0)]);
         let mut out = Attributes::default();
@@ -225,7 +225,7 @@ mod tests {
         assert!(fields.push(&mut out, &record(9999.0, f64::NAN)));
         assert_eq!(out.intensity, [0, 65_535]);
         assert_eq!(out.color, [[65_535; 3], [0; 3]]);
-        let mut packed = Fields::plain([0, 1, 2]);
+        let mut packed = CloudFields::plain([0, 1, 2]);
         packed.color = CloudColor::Packed { column: 3, is_float: true };
         let bits = f64::from(f32::from_bits(0x00ff_8001));
         assert!(!packed.push(&mut out, &[0.0, 0.0, 0.0, 0.0, bits, 0.0, 0.0]));

@@ -46,3 +46,10 @@ impl<'a> HeaderLines<'a> {
         Error::bad_input(what).at(format!("line {}", self.number))
     }
 }
+
+/// The error of a file that holds fewer points than its header announces.
+pub(super) fn too_short(n: u64) -> Error {
+    Error::bad_input(format!("file is too short for the announced points, \"{n}\""))
+        .at("header")
+        .hint("the file is truncated or its header is wrong: copy or export it again")
+}

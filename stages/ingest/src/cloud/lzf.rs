@@ -1,5 +1,6 @@
-//! Decompresses LZF gradually, from any of many places. A compressed PCD holds all values of x, then
-//! all of y and so on; with one stream a field its records are read in order, in bounded memory.
+//! Decompresses LZF gradually, from any of many places. A compressed PCD holds all values of x,
+//! then all of y and so on; with one stream a field its records are read in order, in bounded
+//! memory.
 
 use contract::{Error, Result};
 

@@ -1,8 +1,8 @@
 //! Compressed records of a PCD file: all values of the first field, then all of the next.
 
 use super::binary::{BinarySlot, Scalar};
-use super::body::too_short;
 use super::fields::Slots;
+use super::header::too_short;
 use super::lzf::{AHEAD, LzfIndex, LzfStream};
 use contract::{Error, Result};
 

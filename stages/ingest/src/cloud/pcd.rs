@@ -1,9 +1,9 @@
 //! The header of PCD files of the Point Cloud Library.
 
 use super::binary::{BinaryBody, BinarySlot, Scalar};
-use super::body::{Body, CloudSeed, too_short};
-use super::fields::{CloudColor, Fields};
-use super::header::HeaderLines;
+use super::body::{CloudSeed, RecordBody};
+use super::fields::{CloudColor, CloudFields};
+use super::header::{HeaderLines, too_short};
 use super::packed::PackedBody;
 use super::text_body::TextBody;
 use crate::frame;
@@ -42,7 +42,7 @@ pub(super) fn open(file: &[u8], metres: [f64; 3]) -> Result<CloudSeed> {
         return Err(lines.error("header states no number of points"));
     };
     let (names, columns) = names(&header);
-    let Some(mut fields) = Fields::by_names(&names) else {
+    let Some(mut fields) = CloudFields::by_names(&names) else {
         return Err(lines
             .error("FIELDS lacks x, y or z")
             .hint("export the points with their coordinates"));
@@ -59,6 +59,43 @@ pub(super) fn open(file: &[u8], metres: [f64; 3]) -> Result<CloudSeed> {
         .try_fold(0_usize, |sum, f| sum.checked_add(f.size.checked_mul(f.count)?))
         .filter(|record| (1..=MAX_STRIDE).contains(record))
         .ok_or_else(|| lines.error("a point is too long or empty"))?;
+    let slots = slots(&header, &columns, &scalars, &fields);
+    let start = lines.end() as u64;
+    let pose = viewpoint(&header, metres)?;
+    let mut seed = match &*encoding {
+        "ascii" => {
+            let n_columns = header.fields.iter().map(|f| f.count).sum();
+            let body = TextBody::new(None, n_columns, &fields.slots());
+            let mut seed = CloudSeed::new(RecordBody::Text(body), fields, n);
+            seed.uncounted = Some((start, lines.number(), 0));
+            seed
+        }
+        "binary" => {
+            let end = n.checked_mul(record as u64).and_then(|len| len.checked_add(start));
+            if end.is_none_or(|end| end > file.len() as u64) {
+                return Err(too_short(n));
+            }
+            let body = BinaryBody { start, stride: record, is_big: false, slots };
+            CloudSeed::new(RecordBody::Binary(body), fields, n)
+        }
+        "binary_compressed" => {
+            let body = PackedBody::open(file, start, n, record, slots)?;
+            CloudSeed::new(RecordBody::Packed(body), fields, n)
+        }
+        other => return Err(lines.error(format!("DATA is not known, \"{other}\""))),
+    };
+    seed.pose = pose;
+    Ok(seed)
+}
+
+/// Where the values that are kept lie in a record. `columns` are the first columns of the fields,
+/// `scalars` their types.
+fn slots(
+    header: &PcdHeader,
+    columns: &[usize],
+    scalars: &[Scalar],
+    fields: &CloudFields,
+) -> Vec<BinarySlot> {
     let mut offsets = Vec::new();
     let mut offset = 0;
     for field in &header.fields {
@@ -71,32 +108,7 @@ pub(super) fn open(file: &[u8], metres: [f64; 3]) -> Result<CloudSeed> {
         let stride = field.size * field.count;
         Some(BinarySlot { offset: offsets[at], stride, scalar: scalars[at], slot })
     });
-    let (slots, start): (Vec<BinarySlot>, _) = (slots.collect(), lines.end() as u64);
-    let pose = viewpoint(&header, metres)?;
-    let mut seed = match &*encoding {
-        "ascii" => {
-            let n_columns = header.fields.iter().map(|f| f.count).sum();
-            let body = TextBody::new(None, n_columns, &fields.slots());
-            let mut seed = CloudSeed::new(Body::Text(body), fields, n);
-            seed.uncounted = Some((start, lines.number(), 0));
-            seed
-        }
-        "binary" => {
-            let end = n.checked_mul(record as u64).and_then(|len| len.checked_add(start));
-            if end.is_none_or(|end| end > file.len() as u64) {
-                return Err(too_short(n));
-            }
-            let body = BinaryBody { start, stride: record, is_big: false, slots };
-            CloudSeed::new(Body::Binary(body), fields, n)
-        }
-        "binary_compressed" => {
-            let body = PackedBody::open(file, start, n, record, slots)?;
-            CloudSeed::new(Body::Packed(body), fields, n)
-        }
-        other => return Err(lines.error(format!("DATA is not known, \"{other}\""))),
-    };
-    seed.pose = pose;
-    Ok(seed)
+    slots.collect()
 }
 
 /// Names of the fields, each with its first column; and the first column of each field.

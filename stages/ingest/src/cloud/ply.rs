@@ -1,8 +1,8 @@
 //! The header of PLY files, whose vertices are the points.
 
 use super::binary::{BinaryBody, BinarySlot, Scalar};
-use super::body::{Body, CloudSeed};
-use super::fields::{CloudColor, Fields};
+use super::body::{CloudSeed, RecordBody};
+use super::fields::{CloudColor, CloudFields};
 use super::header::HeaderLines;
 use super::text_body::TextBody;
 use contract::{Error, Kind, Result};
@@ -18,7 +18,7 @@ enum Encoding {
 }
 
 /// An element of the header.
-struct Element {
+struct PlyElement {
     name: String,
     n: u64,
     /// Its properties, each with its name; `None` for a list.
@@ -35,7 +35,7 @@ pub(super) fn open(file: &[u8]) -> Result<CloudSeed> {
     let vertex = &elements[at];
     let names: Vec<(String, usize)> =
         vertex.properties.iter().enumerate().map(|(i, p)| (p.0.clone(), i)).collect();
-    let Some(mut fields) = Fields::by_names(&names) else {
+    let Some(mut fields) = CloudFields::by_names(&names) else {
         return Err(lines
             .error("element \"vertex\" lacks a property x, y or z")
             .hint("export the points again"));
@@ -44,7 +44,7 @@ pub(super) fn open(file: &[u8]) -> Result<CloudSeed> {
     if let CloudColor::Packed { .. } = fields.color {
         fields.color = CloudColor::None;
     }
-    let is_list = |e: &&Element| e.properties.iter().any(|(_, scalar)| scalar.is_none());
+    let is_list = |e: &&PlyElement| e.properties.iter().any(|(_, scalar)| scalar.is_none());
     if encoding != Encoding::Ascii && elements[..=at].iter().any(|e| is_list(&e)) {
         let what = "PLY whose points hold lists or follow lists is not read";
         return Err(Error::new(Kind::Unsupported, what)
@@ -60,7 +60,7 @@ pub(super) fn open(file: &[u8]) -> Result<CloudSeed> {
             }
             let body = TextBody::new(None, names.len(), &fields.slots());
             let n_before = elements[..at].iter().fold(0_u64, |n, e| n.saturating_add(e.n));
-            let mut seed = CloudSeed::new(Body::Text(body), fields, vertex.n);
+            let mut seed = CloudSeed::new(RecordBody::Text(body), fields, vertex.n);
             seed.uncounted = Some((start, lines.number(), n_before));
             seed
         }
@@ -75,14 +75,14 @@ pub(super) fn open(file: &[u8]) -> Result<CloudSeed> {
 }
 
 fn binary(
-    elements: &[Element],
-    fields: Fields,
+    elements: &[PlyElement],
+    fields: CloudFields,
     start: u64,
     is_big: bool,
     lines: &HeaderLines<'_>,
     file: &[u8],
 ) -> Result<CloudSeed> {
-    let stride = |e: &Element| -> usize {
+    let stride = |e: &PlyElement| -> usize {
         e.properties.iter().filter_map(|(_, scalar)| *scalar).map(Scalar::len).sum()
     };
     let Some((vertex, before)) = elements.split_last() else {
@@ -109,15 +109,15 @@ fn binary(
         .and_then(|start| start.checked_add(vertex.n.checked_mul(offset as u64)?))
         .filter(|end| *end <= file.len() as u64);
     let (Some(start), Some(_)) = (start, end) else {
-        return Err(super::body::too_short(vertex.n));
+        return Err(super::header::too_short(vertex.n));
     };
     let body = BinaryBody { start, stride: offset, is_big, slots };
-    Ok(CloudSeed::new(Body::Binary(body), fields, vertex.n))
+    Ok(CloudSeed::new(RecordBody::Binary(body), fields, vertex.n))
 }
 
-fn header(lines: &mut HeaderLines<'_>) -> Result<(Encoding, Vec<Element>)> {
+fn header(lines: &mut HeaderLines<'_>) -> Result<(Encoding, Vec<PlyElement>)> {
     let mut encoding = None;
-    let mut elements: Vec<Element> = Vec::new();
+    let mut elements: Vec<PlyElement> = Vec::new();
     lines.next()?;
     loop {
         let words = lines.next()?;
@@ -135,7 +135,7 @@ fn header(lines: &mut HeaderLines<'_>) -> Result<(Encoding, Vec<Element>)> {
             ["element", name, n] => {
                 let n = n.parse();
                 let n = n.map_err(|_| lines.error("number of elements is no count"))?;
-                elements.push(Element { name: name.into(), n, properties: Vec::new() });
+                elements.push(PlyElement { name: name.into(), n, properties: Vec::new() });
             }
             ["property", "list", _, _, name] => property(lines, &mut elements, name, None)?,
             ["property", kind, name] => {
@@ -155,7 +155,7 @@ fn header(lines: &mut HeaderLines<'_>) -> Result<(Encoding, Vec<Element>)> {
 
 fn property(
     lines: &HeaderLines<'_>,
-    elements: &mut [Element],
+    elements: &mut [PlyElement],
     name: &str,
     scalar: Option<Scalar>,
 ) -> Result<()> {

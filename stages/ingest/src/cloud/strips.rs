@@ -1,8 +1,8 @@
 //! Makes strips of records.
 
 use super::fields::Slots;
+use super::file::{CloudFile, CloudPart};
 use super::packed::{PackedBody, PackedStreams};
-use super::{CloudFile, CloudPart};
 use crate::reader::{RawStrip, Want};
 use contract::{Attributes, Result};
 

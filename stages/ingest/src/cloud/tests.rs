@@ -208,7 +208,7 @@ fn each_block_of_a_pts_file_is_a_scan() {
 #[test]
 fn real_pts_files_are_read_in_full() {
     let Some(folder) = shared("ptx-pts") else { return };
-    // Counted, and read with NumPy from the text.
+    // CountedLines, and read with NumPy from the text.
     let read_as = [
         ("pdal__autzen.pts", 10, true, [636_110.300_003, 849_345.050_003, 512.139_999]),
         ("pdal__bunny_8.pts", 9, false, [-0.037_829, 0.127_94, 0.004_474]),

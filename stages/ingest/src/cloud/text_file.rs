@@ -1,8 +1,8 @@
 //! Opens PTS files (a count, then a line a point, once or several times) and plain text with a line
 //! a point (XYZ, CSV, TXT, ASC), with or without names of the columns.
 
-use super::body::{Body, CloudSeed};
-use super::fields::Fields;
+use super::body::{CloudSeed, RecordBody};
+use super::fields::CloudFields;
 use super::text_body::{STRETCH, Stretch, TextBody, data, is_comment, separator, words};
 use crate::text::{TextLines, number, shown};
 use contract::{Error, Result};
@@ -33,7 +33,7 @@ pub(crate) fn kind(head: &[u8]) -> Option<TextKind> {
     if is_count(first) {
         return second.filter(|line| is_point(line)).map(|_| TextKind::Pts);
     }
-    let is_named = || Fields::by_names(&named(first)).is_some();
+    let is_named = || CloudFields::by_names(&named(first)).is_some();
     (is_point(first) || is_named()).then_some(TextKind::Xyz)
 }
 
@@ -113,7 +113,7 @@ fn table(path: &Path, lines: &mut TextLines) -> Result<CloudSeed> {
         if let Some(text) = data(text) {
             let is_names = words(text, separator(text)).take(3).any(|word| number(word).is_none());
             let names = if is_names { text.to_vec() } else { comment };
-            let fields = Fields::by_names(&named(&names));
+            let fields = CloudFields::by_names(&named(&names));
             if is_names && fields.is_none() {
                 let what = format!("columns of x, y and z are not named, \"{}\"", shown(&names));
                 return Err(lines
@@ -138,7 +138,7 @@ fn table(path: &Path, lines: &mut TextLines) -> Result<CloudSeed> {
 
 /// The records of a file without names of columns, or with named `fields`, the number of names, and
 /// whether these count for every line.
-fn seed_of(found: Counted, fields: Option<(Fields, usize, bool)>) -> Result<CloudSeed> {
+fn seed_of(found: CountedLines, fields: Option<(CloudFields, usize, bool)>) -> Result<CloudSeed> {
     if found.n > 0 && found.n_columns < 3 {
         let line = found.stretches.first().map_or(0, |stretch| stretch.line + 1);
         let n = found.n_columns;
@@ -147,15 +147,15 @@ fn seed_of(found: Counted, fields: Option<(Fields, usize, bool)>) -> Result<Clou
     }
     let fields = match fields {
         Some((fields, n_names, counts)) if counts || n_names == found.n_columns => fields,
-        _ => Fields::by_number(found.n_columns, &found.first),
+        _ => CloudFields::by_number(found.n_columns, &found.first),
     };
     let mut body = TextBody::new(found.separator, found.n_columns, &fields.slots());
     (body.stretches, body.end) = (found.stretches, found.end);
-    Ok(CloudSeed::new(Body::Text(body), fields, found.n))
+    Ok(CloudSeed::new(RecordBody::Text(body), fields, found.n))
 }
 
-/// Finds the lines of the points that a header of PLY or PCD announces, `n` of them after `n_skipped`
-/// others from a byte and after a line.
+/// Finds the lines of the points that a header of PLY or PCD announces, `n` of them after
+/// `n_skipped` others from a byte and after a line.
 pub(super) fn announced(
     path: &Path,
     (byte, line, n_skipped): (u64, u64, u64),
@@ -170,7 +170,7 @@ pub(super) fn announced(
     };
     let found = counted(&mut again, |_, at| at == n)?;
     if found.n < n {
-        return Err(super::body::too_short(n));
+        return Err(super::header::too_short(n));
     }
     (body.stretches, body.end) = (found.stretches, found.end);
     Ok(())
@@ -178,7 +178,7 @@ pub(super) fn announced(
 
 /// Lines of records, as they were counted.
 #[derive(Debug, Default)]
-struct Counted {
+struct CountedLines {
     n: u64,
     stretches: Vec<Stretch>,
     /// Byte after the last record, and the number of its line.
@@ -194,9 +194,9 @@ struct Counted {
 
 /// Counts the records from the next line on, up to a line at which they end, of which `is_end` gets
 /// text and number of records before; the lines then are at it.
-fn counted(lines: &mut TextLines, is_end: impl Fn(&[u8], u64) -> bool) -> Result<Counted> {
+fn counted(lines: &mut TextLines, is_end: impl Fn(&[u8], u64) -> bool) -> Result<CountedLines> {
     let (end, end_line) = (lines.end(), lines.number());
-    let mut out = Counted { end, end_line, ..Counted::default() };
+    let mut out = CountedLines { end, end_line, ..CountedLines::default() };
     loop {
         let before = Stretch { byte: lines.end(), line: lines.number() };
         if !lines.advance()? {
