@@ -60,9 +60,10 @@ pub fn convex_pieces(at: BlockAt, mesh: &SurfaceMesh, excess: f64) -> Vec<Surfac
     let low = at.map(|v| f64::from(v) * CONVEX_BLOCK);
     let mut parts: Vec<Corners> =
         mesh.triangles.iter().map(|triangle| mesh.corners(*triangle).to_vec()).collect();
-    for axis in 0..3 {
-        parts = cut(parts, axis, low[axis])[1].clone();
-        parts = cut(parts, axis, low[axis] + CONVEX_BLOCK)[0].clone();
+    for (axis, low) in low.into_iter().enumerate() {
+        let [_, above] = cut(parts, axis, low);
+        let [within, _] = cut(above, axis, low + CONVEX_BLOCK);
+        parts = within;
     }
     let bounds = bounds(&parts);
     if bounds.is_empty() {

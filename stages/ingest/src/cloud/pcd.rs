@@ -141,14 +141,15 @@ fn read(lines: &mut HeaderLines<'_>) -> Result<(PcdHeader, String)> {
                 };
                 header.fields = values.iter().map(field).collect();
             }
-            "SIZE" => {
-                set(lines, &mut header.fields, values, |f, v| Some(f.size = v.parse().ok()?))?
-            }
-            "TYPE" => {
-                set(lines, &mut header.fields, values, |f, v| Some(f.kind = v.chars().next()?))?
-            }
+            "SIZE" => set(lines, &mut header.fields, values, |f, v| {
+                v.parse().ok().map(|size| f.size = size)
+            })?,
+            "TYPE" => set(lines, &mut header.fields, values, |f, v| {
+                v.chars().next().map(|kind| f.kind = kind)
+            })?,
             "COUNT" => set(lines, &mut header.fields, values, |f, v| {
-                Some(f.count = v.parse().ok().filter(|n| *n <= MAX_STRIDE)?)
+                let count = v.parse().ok().filter(|n| *n <= MAX_STRIDE);
+                count.map(|count| f.count = count)
             })?,
             "WIDTH" => width = Some(number(lines, values)?),
             "HEIGHT" => height = Some(number(lines, values)?),
