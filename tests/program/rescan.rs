@@ -173,7 +173,7 @@ fn a_rescanned_cell_is_brought_up_to_date(plant: &Plant) {
     for name in ["base", "again"] {
         spaces_hold_what_tiles_hold(&plant.path(name));
     }
-    exports_leave_out_what_is_superseded(plant, &things);
+    exports_leave_out_what_is_superseded(plant, things);
     goes_on(plant, &out);
 }
 
