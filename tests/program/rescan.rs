@@ -178,8 +178,8 @@ fn a_rescanned_cell_is_brought_up_to_date(plant: &Plant) {
 }
 
 /// Old points that the new session supersedes are gone from scans that are given back, from
-/// clouds and from meshes: all three hold the same points, and no mesh is where a thing was
-/// taken away.
+/// clouds and from meshes: all three hold the same points, and no more of a mesh is where a thing
+/// was taken away than around single points that no new beam contradicts.
 fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Value]) {
     let export = |name: &str, more: &[&str]| {
         let output = plant.run(&[&["export", name, "--to"], more].concat());
@@ -206,7 +206,7 @@ fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Val
     let (before, _) = meshed("base");
     let (after, n_meshed) = meshed("again");
     let n = before.len();
-    assert!(n > 20 && after.is_empty(), "{n} corners, then {after:?}, in {gone}");
+    assert!(n > 200 && after.len() < n / 10, "{n} corners, then {after:?}, in {gone}");
 
     let folder = export("again", &["e57"]).join("e57");
     let valid = |name: &str| -> u64 {

@@ -16,7 +16,8 @@ const SAMPLE: f64 = 2.0;
 /// Where along an axis cuts are tried, as shares of the length; cuts at the excess from both ends,
 /// which take off a wall, are tried as well.
 const CUTS: [f64; 7] = [0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875];
-/// By how much what is flat is made thicker on each side, metres: a hull needs a volume.
+/// By how much a piece is made thicker on each side, metres: a hull needs a volume, and the hull of
+/// a nearly flat sheet may leave out points that are this near to it.
 const THICKER: f64 = 0.0005;
 
 /// Corners of a convex part of a triangle.
@@ -211,19 +212,13 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// The hull of all parts; `None` where they have no extent.
 fn piece(parts: &[Corners]) -> Option<SurfaceMesh> {
     let middle = bounds(parts).center();
-    let near = |grow: f64| {
-        let shifts: Vec<[f64; 3]> = if grow > 0.0 {
-            (0..8).map(|k| [0, 1, 2].map(|i| if k >> i & 1 == 1 { grow } else { -grow })).collect()
-        } else {
-            vec![[0.0; 3]]
-        };
-        let moved = |v: &[f64; 3]| {
-            let v = *v;
-            shifts.iter().map(move |s| [0, 1, 2].map(|i| (v[i] - middle[i] + s[i]) as f32))
-        };
-        parts.iter().flatten().flat_map(moved).collect::<Vec<_>>()
+    let moved = |v: &[f64; 3]| {
+        let v = [0, 1, 2].map(|i| v[i] - middle[i]);
+        let by = |k: usize, i: usize| if k >> i & 1 == 1 { THICKER } else { -THICKER };
+        (0..8).map(move |k| [0, 1, 2].map(|i| (v[i] + by(k, i)) as f32))
     };
-    let found = hull(&near(0.0)).or_else(|| hull(&near(THICKER)))?;
+    let corners: Vec<[f32; 3]> = parts.iter().flatten().flat_map(moved).collect();
+    let found = hull(&corners)?;
     let world = |v: &[f32; 3]| std::array::from_fn(|i| f64::from(v[i]) + middle[i]);
     Some(SurfaceMesh {
         vertices: found.vertices.iter().map(world).collect(),
