@@ -78,13 +78,19 @@ fn of_obj(text: &str) -> Vec<SurfaceMesh> {
     out
 }
 
-/// Whether a place lies in a convex piece, to the rounding of its file. The distance from the hull
-/// of its corners is asked, since rounding turns planes of slivers.
+/// Whether a place lies in a convex piece, to the rounding of its file: on the inner side of all of
+/// its planes, or, since rounding turns those of slivers, near the hull of its corners.
 fn holds(piece: &SurfaceMesh, at: [f64; 3]) -> bool {
     let from = |v: &[f64; 3]| [0, 1, 2].map(|i| (v[i] - at[i]) as f32);
     let corners: Vec<Vector> = piece.vertices.iter().map(|v| Vector::from_array(from(v))).collect();
-    let hull = ConvexPolyhedron::from_convex_hull(&corners).expect("a body");
-    hull.distance_to_local_point(Vector::ZERO, true) <= 2e-4
+    let hull = ConvexPolyhedron::from_convex_hull(&corners);
+    let is_within = |t: &[u32; 3]| {
+        let [a, b, c] = piece.corners(*t).map(geometry::Point::from);
+        let normal = (b - a).cross(&(c - a));
+        normal.dot(&(geometry::Point::from(at) - a)) <= 1e-4 * normal.norm()
+    };
+    piece.triangles.iter().all(is_within)
+        || hull.is_some_and(|hull| hull.distance_to_local_point(Vector::ZERO, true) <= 2e-4)
 }
 
 #[test]
