@@ -75,7 +75,7 @@ pub fn convex_pieces(at: BlockAt, mesh: &SurfaceMesh, excess: f64) -> Vec<Surfac
     while let Some(parts) = waiting.pop() {
         let own = self::bounds(&parts);
         let longest = own.size().into_iter().fold(0.0, f64::max);
-        let Some(piece) = piece(&parts) else { continue };
+        let piece = piece(&parts);
         if longest <= excess || keeps_to(&piece, &grid, excess) {
             out.push(piece);
             continue;
@@ -209,22 +209,29 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum()
 }
 
-/// The hull of all parts; `None` where they have no extent.
-fn piece(parts: &[Corners]) -> Option<SurfaceMesh> {
-    let middle = bounds(parts).center();
+/// The hull of all parts, or their box where no hull is found: of points that coincide or lie in a
+/// line.
+fn piece(parts: &[Corners]) -> SurfaceMesh {
+    let own = bounds(parts);
+    let middle = own.center();
     let moved = |v: &[f64; 3]| {
         let v = [0, 1, 2].map(|i| v[i] - middle[i]);
         let by = |k: usize, i: usize| if k >> i & 1 == 1 { THICKER } else { -THICKER };
         (0..8).map(move |k| [0, 1, 2].map(|i| (v[i] + by(k, i)) as f32))
     };
     let corners: Vec<[f32; 3]> = parts.iter().flatten().flat_map(moved).collect();
-    let found = hull(&corners)?;
+    let Some(found) = hull(&corners) else {
+        let mut whole = SurfaceMesh::default();
+        let around = own.grown(THICKER);
+        whole.add_box(around.min, around.max);
+        return whole;
+    };
     let world = |v: &[f32; 3]| std::array::from_fn(|i| f64::from(v[i]) + middle[i]);
-    Some(SurfaceMesh {
+    SurfaceMesh {
         vertices: found.vertices.iter().map(world).collect(),
         triangles: found.triangles,
         seam: Vec::new(),
-    })
+    }
 }
 
 /// Whether a hull is thin, and its sides lie on the mesh.
@@ -329,6 +336,20 @@ mod tests {
                     assert!(!pieces.iter().any(|p| holds(p, at)), "{at:?} at {turn}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_box_around_a_single_point_is_covered_where_blocks_cut_it() {
+        let mut mesh = SurfaceMesh::default();
+        for low in [[-4.4926, -9.9895, -0.0015], [9.9966, 4.7303, -0.0005], [1.0, 2.0, 3.0]] {
+            mesh.add_box(low, low.map(|v| v + 0.001));
+        }
+        let pieces = pieces(&mesh, 0.01);
+        let all: Vec<Aabb> =
+            pieces.iter().map(|piece| Aabb::of(piece.vertices.iter().copied())).collect();
+        for at in &mesh.vertices {
+            assert!(all.iter().any(|own| own.grown(1e-6).contains(*at)), "{at:?}, {all:?}");
         }
     }
 }
