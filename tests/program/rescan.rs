@@ -177,8 +177,8 @@ fn a_rescanned_cell_is_brought_up_to_date(plant: &Plant) {
     goes_on(plant, &out);
 }
 
-/// Old points that the new session supersedes are gone from scans that are given back, from
-/// clouds and from meshes: clouds and meshes hold the same points, and no more of a mesh is where a thing
+/// Old points that the new session supersedes are gone from scans that are given back, from clouds
+/// and from meshes: clouds and meshes hold the same points, and no more of a mesh is where a thing
 /// was taken away than around single points that no new beam contradicts.
 fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Value]) {
     let export = |name: &str, more: &[&str]| {
