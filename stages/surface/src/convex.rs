@@ -7,7 +7,7 @@
 use crate::distance::TriangleGrid;
 use crate::mesh::SurfaceMesh;
 use geometry::Aabb;
-use robot::hull;
+use robot::{Mesh, hull};
 
 /// Edge of the blocks that are cut apart by themselves, metres.
 pub const CONVEX_BLOCK: f64 = 2.0;
@@ -209,8 +209,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum()
 }
 
-/// The hull of all parts, or their box where no hull is found: of points that coincide or lie in a
-/// line.
+/// The hull of all parts, or their box where no hull holds them all: hulls are found in single
+/// precision, and leave out what rises a millimetre above a plate of metres.
 fn piece(parts: &[Corners]) -> SurfaceMesh {
     let own = bounds(parts);
     let middle = own.center();
@@ -220,7 +220,9 @@ fn piece(parts: &[Corners]) -> SurfaceMesh {
         (0..8).map(move |k| [0, 1, 2].map(|i| (v[i] + by(k, i)) as f32))
     };
     let corners: Vec<[f32; 3]> = parts.iter().flatten().flat_map(moved).collect();
-    let Some(found) = hull(&corners) else {
+    let local = |v: &[f64; 3]| minus(*v, middle);
+    let holds = |found: &Mesh| parts.iter().flatten().all(|v| is_within(found, local(v)));
+    let Some(found) = hull(&corners).filter(holds) else {
         let mut whole = SurfaceMesh::default();
         let around = own.grown(THICKER);
         whole.add_box(around.min, around.max);
@@ -232,6 +234,14 @@ fn piece(parts: &[Corners]) -> SurfaceMesh {
         triangles: found.triangles,
         seam: Vec::new(),
     }
+}
+
+/// Whether a place is on the inner side of all faces of a hull.
+fn is_within(hull: &Mesh, at: [f64; 3]) -> bool {
+    hull.triangles.iter().all(|t| {
+        let [a, b, c] = t.map(|k| hull.vertices[k as usize].map(f64::from));
+        dot(cross(minus(b, a), minus(c, a)), minus(at, a)) <= 0.0
+    })
 }
 
 /// Whether a hull is thin, and its sides lie on the mesh.
