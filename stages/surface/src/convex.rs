@@ -213,7 +213,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// precision, and leave out what rises a millimetre above a plate of metres.
 fn piece(parts: &[Corners]) -> SurfaceMesh {
     let own = bounds(parts);
-    let middle = own.center();
+    let middle = <[f64; 3]>::from(own.center().coords);
     let moved = |v: &[f64; 3]| {
         let v = [0, 1, 2].map(|i| v[i] - middle[i]);
         let by = |k: usize, i: usize| if k >> i & 1 == 1 { THICKER } else { -THICKER };
