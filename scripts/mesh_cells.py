@@ -192,7 +192,7 @@ def cell(args, k, writer):
     child([*call, "--seed", args.seed, "--keep", "--out", dir / "drawn", *library, *quiet])
     drawn = next((dir / "drawn").rglob("scene.toml"))
     scene = tomllib.loads(drawn.read_text())
-    robots = args.robots if real else args.work / "demo_robots"
+    robots = args.robots if real else args.work / "demo/robots"
     furnished(scene, n_scanners, draw)
     shutil.rmtree(dir / "drawn")
     for name in ("noisy", "exact"):
@@ -245,6 +245,9 @@ def main():
     args.program, args.work = args.program.resolve(), args.work.resolve()
     args.robots = args.robots and args.robots.resolve()
     args.work.mkdir(parents=True, exist_ok=True)
+    demo = args.work / "demo"
+    if not demo.exists():
+        child([args.program, "demo", "--out", demo, "--progress", "none"])
     writer = csv.DictWriter(args.csv, None)
     for k in range(args.first, args.first + args.cells):
         cell(args, k, writer)

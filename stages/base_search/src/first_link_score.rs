@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use crate::first_link::FirstLink;
+use crate::first_link_stencils::FirstLinkStencils;
 use crate::problem::BaseSearch;
 use crate::trial::{BaseTrial, MAX_LAG, SampleScore, Samples, judged_score};
 
@@ -126,9 +127,10 @@ impl BaseSearch<'_> {
             let (poses, quick_scores) = self.sweep(plane, &trial, first_link, tolerance);
             let least = quick_scores.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b)) - MAX_LAG;
             let full = poses.iter().zip(&quick_scores).filter(|(_, score)| **score >= least);
+            let full = full.map(|(pose, _)| pose).collect();
             let rating =
                 |p: &Pose| self.region.rating(&samples.probe(self.region.evidence, p, tolerance));
-            highest(full.map(|(p, _)| rating(p)))
+            highest(self.likely_poses(samples, full, tolerance).into_iter().map(rating))
         } else {
             let local_from_base = self.pose(plane, trial.x, trial.y, trial.yaw);
             let probe = self.probe_first_by_scan(&local_from_base, first_link, tolerance);
@@ -139,24 +141,53 @@ impl BaseSearch<'_> {
     }
 
     /// Like [`Self::with_first_link`], but with quick scores, the score that the base has already,
-    /// and the tolerance of the link itself, metres.
+    /// and the tolerance of the link itself, metres. On a coarse grid the link's samples are looked
+    /// up in `stencils`.
     pub(crate) fn quick_with_first_link(
         &self,
         plane: &Plane,
         trial: BaseTrial,
         tolerance: f32,
+        stencils: Option<&FirstLinkStencils<'_>>,
     ) -> BaseTrial {
         let Some(first_link) = self.first.as_ref().filter(|_| self.region.by_scan.is_empty())
         else {
             return trial;
         };
-        let samples = Samples::first(self.model, first_link.link, self.settings.n_coarse);
-        let (poses, quick_scores) = self.sweep(plane, &trial, first_link, tolerance);
-        let mut best: Vec<usize> = (0..quick_scores.len()).collect();
-        best.sort_by(|a, b| quick_scores[*b].total_cmp(&quick_scores[*a]));
-        let rating = |k: &usize| self.quick_score(samples, &poses[*k], tolerance);
+        let local_from_root = self.pose(plane, trial.x, trial.y, trial.yaw);
+        let shift = stencils.and_then(|stencils| stencils.shift(&trial, &local_from_root));
+        let score = |k: usize, n_samples: usize| {
+            let known = shift.as_ref().and_then(|shift| shift.look_up(k, n_samples));
+            known.unwrap_or_else(|| {
+                let samples = Samples::first(self.model, first_link.link, n_samples);
+                let pose = local_from_root * first_link.root_from_link[k];
+                self.quick_score(samples, &pose, tolerance)
+            })
+        };
+        let few = self.settings.n_coarse / 4;
+        let n = first_link.root_from_link.len();
+        let mut best: Vec<(f64, usize)> = (0..n).map(|k| (score(k, few).score, k)).collect();
+        best.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let rating = |(_, k): &(f64, usize)| score(*k, self.settings.n_coarse);
         let first = highest(best.iter().take(N_QUICK_VALUES).map(rating));
         BaseTrial { rating: self.combined(trial.rating, first), first, ..trial }
+    }
+
+    /// The poses of the first link whose quick score with all samples is highest; all poses in a
+    /// thorough search.
+    fn likely_poses<'p>(
+        &self,
+        samples: Samples<'_>,
+        mut poses: Vec<&'p Pose>,
+        tolerance: f32,
+    ) -> Vec<&'p Pose> {
+        if self.thrift.is_best_first && poses.len() > N_QUICK_VALUES {
+            let score = |pose: &Pose| self.quick_score(samples, pose, tolerance).score;
+            let mut scored: Vec<(f64, &Pose)> = poses.into_iter().map(|p| (score(p), p)).collect();
+            scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+            poses = scored.into_iter().take(N_QUICK_VALUES).map(|(_, pose)| pose).collect();
+        }
+        poses
     }
 
     /// The likely poses of the first link in the root's frame, by quick scores of few samples at

@@ -102,7 +102,8 @@ impl BaseSearch<'_> {
             true => {
                 let rating = self.look(planes, &t, self.settings.n_fine, tolerance);
                 let trial = BaseTrial { rating, ..t };
-                self.quick_with_first_link(&planes[t.plane], trial, FIRST_LINK_REACH * tolerance)
+                let tolerance = FIRST_LINK_REACH * tolerance;
+                self.quick_with_first_link(&planes[t.plane], trial, tolerance, None)
             }
             false => self.with_first_link(&planes[t.plane], t, tolerance),
         };

@@ -13,6 +13,7 @@ mod body_boxes;
 mod evidence_grid;
 mod first_link;
 mod first_link_score;
+mod first_link_stencils;
 mod hill_climb;
 mod outscored;
 mod problem;

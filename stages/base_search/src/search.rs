@@ -10,6 +10,7 @@ use geometry::{Plane, Pose, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 
 use crate::first_link_score::PlausibleBases;
+use crate::first_link_stencils::FirstLinkStencils;
 use crate::hill_climb::SearchLevel;
 use crate::outscored::CoarseBases;
 use crate::problem::BaseSearch;
@@ -74,8 +75,10 @@ impl BaseSearch<'_> {
         // Large parts of a cell have the height of a base. The first link excludes them sooner than
         // a finer grid does.
         let tolerance = self.coarse_tolerance();
-        let mut trials =
-            fan.fan(trials, |t| self.quick_with_first_link(&local[t.plane], t, tolerance));
+        let stencils = FirstLinkStencils::new(self, &local, &trials, tolerance);
+        let mut trials = fan.fan(trials, |t| {
+            self.quick_with_first_link(&local[t.plane], t, tolerance, Some(&stencils))
+        });
         best(
             &mut trials,
             Thinning {
@@ -284,27 +287,24 @@ impl BaseSearch<'_> {
         }
         // The scans show no points in the middle of a base, so that points around it are counted.
         let r = ((self.radius * SURROUND_SHARE) / step).ceil() as isize;
-        let mut out = Vec::new();
-        for j in 0..n[1] as isize {
-            for i in 0..n[0] as isize {
-                let filled = |di: isize, dj: isize| {
-                    let (a, b) = (i + di, j + dj);
-                    a >= 0
-                        && b >= 0
-                        && (a as usize) < n[0]
-                        && (b as usize) < n[1]
-                        && count[b as usize * n[0] + a as usize] >= MIN_IN_CELL
-                };
-                let near = (-r..=r)
-                    .flat_map(|dj| (-r..=r).map(move |di| (di, dj)))
-                    .filter(|(di, dj)| di * di + dj * dj <= r * r && filled(*di, *dj))
-                    .count();
-                if near >= MIN_CELLS {
-                    out.push((low[0] + i as f64 * step, low[1] + j as f64 * step));
+        let disc: Vec<(isize, isize)> = (-r..=r)
+            .flat_map(|dj| (-r..=r).map(move |di| (di, dj)))
+            .filter(|(di, dj)| di * di + dj * dj <= r * r)
+            .collect();
+        let mut near = vec![0_usize; count.len()];
+        for (at, _) in count.iter().enumerate().filter(|(_, n)| **n >= MIN_IN_CELL) {
+            let (i, j) = ((at % n[0]) as isize, (at / n[0]) as isize);
+            for (di, dj) in &disc {
+                let (a, b) = (i + di, j + dj);
+                if a >= 0 && b >= 0 && (a as usize) < n[0] && (b as usize) < n[1] {
+                    near[b as usize * n[0] + a as usize] += 1;
                 }
             }
         }
-        out
+        let place = |at: usize| {
+            (low[0] + (at % n[0]) as f64 * step, low[1] + (at / n[0]) as f64 * step)
+        };
+        near.iter().enumerate().filter(|(_, n)| **n >= MIN_CELLS).map(|(at, _)| place(at)).collect()
     }
 
     /// Refines trials to the finest level in batches, best first. Ends where no other trial can

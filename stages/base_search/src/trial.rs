@@ -142,10 +142,10 @@ pub(crate) struct Thinning {
 /// Sorts the trials by descending rank and keeps those that differ from every better one.
 pub(crate) fn best(trials: &mut Vec<BaseTrial>, thinning: Thinning) {
     let Thinning { keep, quota, step, yaw_step } = thinning;
-    trials.sort_by(|a, b| {
-        b.rating
-            .rank()
-            .total_cmp(&a.rating.rank())
+    let mut sorted: Vec<(f64, BaseTrial)> = trials.iter().map(|t| (t.rating.rank(), *t)).collect();
+    sorted.sort_unstable_by(|(a_rank, a), (b_rank, b)| {
+        b_rank
+            .total_cmp(a_rank)
             .then(a.plane.cmp(&b.plane))
             .then(a.x.total_cmp(&b.x))
             .then(a.y.total_cmp(&b.y))
@@ -156,7 +156,7 @@ pub(crate) fn best(trials: &mut Vec<BaseTrial>, thinning: Thinning) {
     let edge = PLACE.max(step);
     let cell = |t: &BaseTrial| [t.x, t.y].map(|v| (v / edge).floor() as i32);
     let mut cells: HashMap<(usize, [i32; 2]), Vec<usize>> = HashMap::new();
-    for trial in trials.iter() {
+    for (_, trial) in &sorted {
         if kept.len() == keep {
             break;
         }

@@ -142,11 +142,24 @@ impl SampleBlock {
     fn ask(&mut self, eye: &Eye<'_>, tolerance: f32) {
         let mut which = [0_u8; BLOCK + 1];
         let n = self.facing(eye.at(), &mut which);
-        for some in which[..n].chunks(LANES) {
-            let place = |lane: usize| usize::from(some[lane.min(some.len() - 1)]);
-            let at: [usize; LANES] = std::array::from_fn(place);
-            let local = [0, 1, 2].map(|axis| at.map(|i| self.p[axis][i]));
-            let (through, on) = said(&eye.look_lanes(&local, 0.5 * tolerance), tolerance);
+        let Some(last) = n.checked_sub(1) else { return };
+        // Each of the three loops is done for all samples before the next: vectors that are read
+        // right after their numbers were written one by one would have to wait for them.
+        let mut local = [[0.0; BLOCK]; 3];
+        for to in 0..n.next_multiple_of(LANES).min(BLOCK) {
+            let i = usize::from(which[to.min(last)]).min(BLOCK - 1);
+            for axis in 0..3 {
+                local[axis][to] = self.p[axis][i];
+            }
+        }
+        let mut looks = [Looks::NOTHING; BLOCK / LANES];
+        let n_lanes = n.div_ceil(LANES);
+        for (k, looks) in looks.iter_mut().enumerate().take(n_lanes) {
+            let lanes = |axis: &[f32; BLOCK]| std::array::from_fn(|lane| axis[k * LANES + lane]);
+            *looks = eye.look_lanes(&local.each_ref().map(lanes), 0.5 * tolerance);
+        }
+        for (looks, some) in looks.iter().zip(which[..n].chunks(LANES)) {
+            let (through, on) = said(looks, tolerance);
             for (lane, &i) in some.iter().enumerate() {
                 let i = usize::from(i);
                 self.through[i] = self.through[i].max(through[lane]);
