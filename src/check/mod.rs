@@ -6,12 +6,14 @@
 //! separately.
 
 mod report;
+mod strays;
 mod subject;
 mod surroundings;
 pub mod trajectory;
 mod words;
 
 pub use report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
+pub(crate) use strays::{StrayPoints, stray_points};
 
 use crate::cache::VerifiedFiles;
 use crate::detect::library;
@@ -24,6 +26,7 @@ use clearance::{Contacts, FARTHEST, Obstacles, PathWalk, RobotBody};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
 use robot::Model;
+use std::path::Path;
 use subject::CheckedRobot;
 use surroundings::Surroundings;
 use trajectory::Trajectory;
@@ -76,7 +79,8 @@ pub(crate) fn at_robot<T>(
         .hint("run the same job again"));
     }
     let number = choose(&result, &state)?;
-    let (fits, models) = reported_robots(request, &state, means, engine)?;
+    let library = request.robots.as_deref();
+    let (fits, models) = reported_robots(library, &state, means, engine)?;
     let robots: Vec<CheckedRobot<'_>> = (fits.iter())
         .map(|(number, fit)| {
             let (entry, model) = (&result.robots[*number], &models[fit.model]);
@@ -89,8 +93,7 @@ pub(crate) fn at_robot<T>(
     let around = Surroundings { out, files: &files, state: &state, result: &result };
     let others: Vec<(usize, &Fit)> =
         fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
-    let (mut body, mut obstacles) = surrounded(robot, &around, &others, &models, request, engine)?;
-    body.remove_robot(&robot.found(), &mut obstacles);
+    let (body, obstacles) = surrounded(robot, &around, &others, &models, request.margin, engine)?;
     then(&RobotSite {
         request,
         robot,
@@ -132,16 +135,15 @@ impl RobotSite<'_> {
     }
 }
 
-/// The robot with attached bodies, and everything within its reach.
+/// The robot with attached bodies, and everything within its reach but itself.
 fn surrounded<'a>(
     robot: &CheckedRobot<'a>,
     around: &Surroundings<'_>,
     others: &[(usize, &Fit)],
     models: &[Model],
-    request: &CheckRequest,
+    margin: f64,
     engine: &Engine,
 ) -> Result<(RobotBody<'a>, Obstacles)> {
-    let margin = request.margin;
     let mut far = clearance::reach(robot.model) + margin + HUNG;
     loop {
         if far > FARTHEST {
@@ -149,12 +151,13 @@ fn surrounded<'a>(
             return Err(Error::new(Kind::Unsupported, what)
                 .hint("correct the limits of its sliding joints in the URDF"));
         }
-        let (hung, obstacles) = around.gather(robot, others, models, far, engine)?;
+        let (hung, mut obstacles) = around.gather(robot, others, models, far, engine)?;
         let largest = obstacles.largest();
         let new = || RobotBody::new(robot.model, hung, margin, largest, &AllThreads);
-        let body = engine.pool()?.install(new);
+        let mut body = engine.pool()?.install(new);
         let needed = body.farthest() + margin + BETWEEN;
         if needed <= far {
+            body.remove_robot(&robot.found(), &mut obstacles);
             return Ok((body, obstacles));
         }
         far = needed + HUNG;
@@ -230,12 +233,12 @@ type NumberedFit = (usize, Fit);
 
 /// All reported robots with their indices, and their models.
 fn reported_robots(
-    request: &CheckRequest,
+    library: Option<&Path>,
     state: &PlantState,
     means: &Means,
     engine: &Engine,
 ) -> Result<(Vec<NumberedFit>, Vec<Model>)> {
-    let dir = request.robots.as_deref().unwrap_or(&state.robots);
+    let dir = library.unwrap_or(&state.robots);
     let stands = |fit: &Fit| fit.verdict != Verdict::Refused;
     let (numbers, fits): (Vec<usize>, Vec<Fit>) =
         state.fits.iter().cloned().enumerate().filter(|(_, fit)| stands(fit)).unzip();

@@ -217,7 +217,7 @@ pub(super) struct ExportFlags {
     /// and those of an earlier result are named
     #[arg(long, value_name = "FORMAT", value_enum)]
     pub(super) to: ExportFormat,
-    /// Robot library, for scenes (default: that of the run)
+    /// Robot library, for scenes and meshes (default: that of the run)
     #[arg(long, value_name = "DIR")]
     pub(super) robots: Option<PathBuf>,
     /// ROS package in whose folder the scene will lie: mesh paths of URDFs become

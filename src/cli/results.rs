@@ -119,7 +119,7 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
             written
         }
         None if flags.to == ExportFormat::Mesh => {
-            let mesh = export_mesh(&mesh_request(flags)?, &engine)?;
+            let mesh = export_mesh(&mesh_request(flags)?, &means, &engine)?;
             mesh.warnings.iter().for_each(|warning| say.warning(warning));
             words = mesh.words;
             mesh.paths
@@ -158,6 +158,7 @@ fn mesh_request(flags: &ExportFlags) -> Result<MeshRequest> {
         robot: robot.clone(),
         with_unknown: *unknown,
         with_convex: *convex,
+        robots: flags.robots.clone(),
     })
 }
 
@@ -179,8 +180,8 @@ fn flags_fit(flags: &ExportFlags, scene: Option<SceneFormat>) -> Result<()> {
             "leave them out for this format: a PTX has a line for each beam",
         );
     }
-    if scene.is_none() && flags.robots.is_some() {
-        return usage("--robots is for scenes".into(), "leave it out for this format");
+    if scene.is_none() && flags.to != ExportFormat::Mesh && flags.robots.is_some() {
+        return usage("--robots is for scenes and meshes".into(), "leave it out for this format");
     }
     let MeshFlags { bound, triangles, mesh_format, robot, unknown, convex } = &flags.mesh;
     let has_any = bound.is_some() || triangles.is_some() || mesh_format.is_some();

@@ -4,6 +4,7 @@
 use super::mesh_chunks::VoxelScratch;
 use super::plant_state::PlantState;
 use crate::cache::VerifiedFiles;
+use crate::check::StrayPoints;
 use crate::engine::{Engine, Task};
 use contract::{PointKind, Result, Space, SpaceKind};
 use export::read_tile;
@@ -37,6 +38,8 @@ pub(super) struct MeshedResult<'a> {
     pub(super) tiles: Vec<String>,
     pub(super) region: Option<Aabb>,
     pub(super) free: FreeSpace,
+    /// Points that are no obstacles.
+    pub(super) strays: StrayPoints,
     pub(super) scratch: PathBuf,
     pub(super) engine: &'a Engine,
 }
@@ -49,14 +52,27 @@ pub(super) struct BoundedMesh {
     pub(super) farthest: f64,
     pub(super) n_points: u64,
     pub(super) n_moving: u64,
+    pub(super) n_strays: u64,
     pub(super) n_fine: usize,
     pub(super) n_boxes: usize,
+}
+
+/// What a mesh makes of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum PointPart {
+    /// It moves with a robot, and is left out.
+    Moves,
+    /// It is no obstacle for `check`, and is left out.
+    Stray,
+    /// It is covered.
+    Stands,
 }
 
 /// Points of a tile that are read.
 struct ReadPoints {
     n: u64,
     n_moving: u64,
+    n_strays: u64,
     /// Bounds of those that stand still.
     bounds: Aabb,
 }
@@ -120,15 +136,18 @@ impl MeshedResult<'_> {
         let scratch = VoxelScratch::create(&self.scratch)?;
         let counted = self.engine.fan_out("voxels", self.tiles.clone(), |tile| {
             let mut voxels = OccupiedVoxels::new(lattice);
-            let mut own = ReadPoints { n: 0, n_moving: 0, bounds: Aabb::EMPTY };
-            self.each_point(&tile, |world, moves| {
-                if moves {
-                    own.n_moving += 1;
-                    return Ok(());
+            let mut own = ReadPoints { n: 0, n_moving: 0, n_strays: 0, bounds: Aabb::EMPTY };
+            self.each_point(&tile, |world, part| {
+                match part {
+                    PointPart::Moves => own.n_moving += 1,
+                    PointPart::Stray => own.n_strays += 1,
+                    PointPart::Stands => {
+                        own.n += 1;
+                        own.bounds.add(world);
+                        voxels.add(world)?;
+                    }
                 }
-                own.n += 1;
-                own.bounds.add(world);
-                voxels.add(world)
+                Ok(())
             })?;
             scratch.add(voxels.into_chunks())?;
             Ok(own)
@@ -150,6 +169,7 @@ impl MeshedResult<'_> {
             farthest: 0.0,
             n_points: counted.iter().map(|own| own.n).sum(),
             n_moving: counted.iter().map(|own| own.n_moving).sum(),
+            n_strays: counted.iter().map(|own| own.n_strays).sum(),
             n_fine,
             n_boxes: 0,
         };
@@ -169,8 +189,8 @@ impl MeshedResult<'_> {
                 }
                 let grid = TriangleGrid::new(mesh, bounds, bound);
                 let (most, mut farthest) = ((HELD * bound).powi(2) as f32, 0.0_f32);
-                self.each_point(tile, |world, moves| {
-                    if moves {
+                self.each_point(tile, |world, part| {
+                    if part != PointPart::Stands {
                         return Ok(());
                     }
                     let square = grid.square(world, farthest);
@@ -195,11 +215,11 @@ impl MeshedResult<'_> {
         Ok(found)
     }
 
-    /// Passes each point of a tile in the region, and whether it moves with a robot.
+    /// Passes each point of a tile in the region, and what the mesh makes of it.
     fn each_point(
         &self,
         tile: &str,
-        mut take: impl FnMut([f64; 3], bool) -> Result<()>,
+        mut take: impl FnMut([f64; 3], PointPart) -> Result<()>,
     ) -> Result<()> {
         let (path, stated) = self.files.stated(tile)?;
         read_tile(&path, &self.state.records.las(), stated, |points| {
@@ -207,8 +227,12 @@ impl MeshedResult<'_> {
             for point in points {
                 let is_inside = self.region.is_none_or(|region| region.contains(point.world));
                 if is_inside {
-                    let kind = point.label.kind;
-                    take(point.world, matches!(kind, PointKind::Link | PointKind::Attachment))?;
+                    let part = match point.label.kind {
+                        PointKind::Link | PointKind::Attachment => PointPart::Moves,
+                        kind if self.strays.contains(point.world, kind) => PointPart::Stray,
+                        _ => PointPart::Stands,
+                    };
+                    take(point.world, part)?;
                 }
             }
             Ok(())

@@ -11,9 +11,10 @@
 use super::mesh_build::{BoundedMesh, MeshedResult, convex, unknown};
 use super::plant_state::PlantState;
 use crate::cache::{EXPORT, VerifiedFiles, tiles_of};
+use crate::check::{StrayPoints, stray_points};
 use crate::engine::Engine;
 use crate::io::own_paths::without_links;
-use crate::job::Job;
+use crate::job::{Job, Means};
 use contract::{Error, Kind, Result, Space};
 use export::ResultFile;
 use geometry::Aabb;
@@ -51,6 +52,8 @@ pub struct MeshRequest {
     pub with_unknown: bool,
     /// Whether convex pieces are written, too.
     pub with_convex: bool,
+    /// Robot library; `None` for that of the run.
+    pub robots: Option<PathBuf>,
 }
 
 impl MeshFormat {
@@ -99,7 +102,7 @@ pub struct MeshOutcome {
 ///
 /// # Errors
 /// There is no result, it has no tiles or no such robot, or files cannot be read or written.
-pub fn export_mesh(request: &MeshRequest, engine: &Engine) -> Result<MeshOutcome> {
+pub fn export_mesh(request: &MeshRequest, means: &Means, engine: &Engine) -> Result<MeshOutcome> {
     let out = &request.out;
     let files = VerifiedFiles::open(out)?;
     // No run can use a result that was copied without its store.
@@ -111,9 +114,10 @@ pub fn export_mesh(request: &MeshRequest, engine: &Engine) -> Result<MeshOutcome
     let tiles = tiles(request, &files, &state, region.as_ref())?;
     let folder = format!("{EXPORT}/mesh");
     let scratch = without_links(out, &format!("{folder}/scratch"))?;
-    let meshed =
-        MeshedResult { files: &files, state: &state, tiles, region, free, scratch, engine };
     let mut warnings = Vec::new();
+    let strays = strays(request, (&files, &result, &state), means, engine, &mut warnings);
+    let meshed =
+        MeshedResult { files: &files, state: &state, tiles, region, free, strays, scratch, engine };
     let found = meshed.within(request.bound, request.triangles, &mut warnings)?;
     let place = |name: String| without_links(out, &format!("{folder}/{name}"));
     let ending = request.format.ending();
@@ -151,6 +155,23 @@ pub fn export_mesh(request: &MeshRequest, engine: &Engine) -> Result<MeshOutcome
         found.farthest * 1e3
     );
     Ok(MeshOutcome { paths, words, warnings })
+}
+
+/// Points that are no obstacles for `check`; none where it cannot be asked, as without the models
+/// of the robots.
+fn strays(
+    request: &MeshRequest,
+    published: (&VerifiedFiles, &ResultFile, &PlantState),
+    means: &Means,
+    engine: &Engine,
+    warnings: &mut Vec<String>,
+) -> StrayPoints {
+    let (only, library) = (request.robot.as_deref(), request.robots.as_deref());
+    let found = stray_points(&request.out, published, only, library, means, engine);
+    found.unwrap_or_else(|error| {
+        warnings.push(format!("single stray points near robots are kept in the mesh: {error}"));
+        StrayPoints::default()
+    })
 }
 
 /// Known space of all robots, and the bounds of that of the requested one.
@@ -229,6 +250,9 @@ fn report(
         "area_in_free_space": knows_free.then_some(area.in_free),
         "robot": request.robot,
         "region": meshed.region.map(|region| [region.min, region.max]),
-        "left_out": { "points_of_robots_and_attachments": found.n_moving },
+        "left_out": {
+            "points_of_robots_and_attachments": found.n_moving,
+            "stray_points": found.n_strays,
+        },
     })
 }

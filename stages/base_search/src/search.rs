@@ -301,9 +301,8 @@ impl BaseSearch<'_> {
                 }
             }
         }
-        let place = |at: usize| {
-            (low[0] + (at % n[0]) as f64 * step, low[1] + (at / n[0]) as f64 * step)
-        };
+        let place =
+            |at: usize| (low[0] + (at % n[0]) as f64 * step, low[1] + (at / n[0]) as f64 * step);
         near.iter().enumerate().filter(|(_, n)| **n >= MIN_CELLS).map(|(at, _)| place(at)).collect()
     }
 

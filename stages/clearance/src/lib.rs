@@ -51,6 +51,6 @@ pub use body::{AttachedPoints, RobotBody, STEP, reach};
 pub use contact_level::ContactLevel;
 pub use evidence::attached_points;
 pub use obstacle::{CELL, ObstacleKind};
-pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles};
+pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles, StrayCells};
 pub use path::{Contact, Contacts, Leg, PathWalk, PieceContacts, leg};
 pub use shadow::{ScannerAt, Shadow};

@@ -69,6 +69,39 @@ pub struct Obstacles {
     pub(crate) split: Split,
     /// Scanners with known position.
     eyes: Vec<ScannerAt>,
+    /// Cells of points that are no evidence of an object, with their kind.
+    strays: Vec<(u64, ObstacleKind)>,
+}
+
+/// Cells around a robot whose points are no evidence of an object, see [`Obstacles::strays`].
+#[derive(Debug, Clone)]
+pub struct StrayCells {
+    far: f64,
+    /// Ascending.
+    cells: Vec<(u64, ObstacleKind)>,
+}
+
+impl StrayCells {
+    /// Whether a point (base frame, metres) of this kind is no evidence of an object; `None` beyond
+    /// the distance up to which points were looked at.
+    #[must_use]
+    pub fn contains(&self, p: [f64; 3], what: ObstacleKind) -> Option<bool> {
+        let is_inside = p.iter().all(|v| v.abs() <= self.far);
+        is_inside.then(|| self.cells.binary_search(&(cell(p, self.far), what)).is_ok())
+    }
+
+    /// Where points were looked at; base frame, metres.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        Aabb { min: [-self.far; 3], max: [self.far; 3] }
+    }
+}
+
+/// Key of the cell of a place in the base's frame, at most `far` metres away along each axis.
+fn cell(p: [f64; 3], far: f64) -> u64 {
+    let most = f64::from((1_u32 << BITS) - 1);
+    let place = |i: usize| ((p[i] + far) / CELL).clamp(0.0, most) as u64;
+    place(0) << (2 * BITS) | place(1) << BITS | place(2)
 }
 
 /// How a voxel of unseen space is divided into parts.
@@ -101,14 +134,7 @@ impl Cells {
     /// Adds a point (base frame, at most `far` away) with whether its beam grazed the edge of a
     /// robot, and the `point_source_id` of its scanner.
     pub fn add(&mut self, p: [f64; 3], what: ObstacleKind, is_grazed: bool, source: u16) {
-        let most = f64::from((1_u32 << BITS) - 1);
-        let place = |i: usize| ((p[i] + self.far) / CELL).clamp(0.0, most) as u64;
-        self.cells.push((
-            place(0) << (2 * BITS) | place(1) << BITS | place(2),
-            what,
-            is_grazed,
-            source,
-        ));
+        self.cells.push((cell(p, self.far), what, is_grazed, source));
     }
 
     /// Removes duplicate cells. Call it after each tile, so that only distinct cells take memory.
@@ -126,6 +152,29 @@ impl Cells {
                 own.join(front);
             }
         }
+    }
+
+    /// For each of the obstacles, where its cells are.
+    fn sources(&self) -> Vec<Range<usize>> {
+        let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
+        let mut from = 0;
+        let next = |alike: &[_]| {
+            let own = from..from + alike.len();
+            from = own.end;
+            own
+        };
+        alike.map(next).collect()
+    }
+
+    /// Places of the scanners that measured some cells; of all scanners, if one is not known.
+    fn eyes_of(&self, cells: &Range<usize>) -> Vec<Point> {
+        let eye = |source: u16| {
+            let known = self.fronts.keys().zip(&self.eyes).find(|(own, _)| **own == source);
+            known.map(|(_, eye)| eye.at)
+        };
+        let all = || self.eyes.iter().map(|eye| eye.at).collect();
+        let cells = self.cells[cells.clone()].iter();
+        cells.map(|cell| eye(cell.3)).collect::<Option<Vec<Point>>>().unwrap_or_else(all)
     }
 
     /// One obstacle for each cell and kind.
@@ -178,10 +227,18 @@ impl Obstacles {
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
         let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, thin);
-        let eyes: Vec<Point> = cells.eyes.iter().map(|eye| eye.at).collect();
-        let is_evident = evident(&mut all, behind, &eyes, space, &known.world_from_base);
+        let sources = cells.sources();
+        let eyes = |at: usize| cells.eyes_of(&sources[at]);
+        let is_evident = evident(&mut all, behind, eyes, space, &known.world_from_base);
         let mut evident = is_evident.into_iter();
-        all.retain(|_| evident.next().unwrap_or(true));
+        let mut strays = Vec::new();
+        all.retain(|o| {
+            let is_evident = evident.next().unwrap_or(true);
+            if !is_evident {
+                strays.push((cell(o.at.map(f64::from), cells.far), o.what));
+            }
+            is_evident
+        });
         for (number, model, poses) in others {
             all.extend(surface(*number, model, poses));
         }
@@ -192,7 +249,7 @@ impl Obstacles {
             split = Split::of(space.grid().edge, &base_from_world);
         }
         let (bins, eyes) = (Vec::new(), cells.eyes.clone());
-        let mut out = Self { all, bins, known, far: cells.far, split, eyes };
+        let mut out = Self { all, bins, known, far: cells.far, split, eyes, strays };
         out.sort();
         out
     }
@@ -225,11 +282,25 @@ impl Obstacles {
         for (at, o) in self.all.iter().enumerate() {
             match of(at, o) {
                 Replaced::Kept => all.push(*o),
-                Replaced::By(others) => all.extend(others),
+                Replaced::By(others) => {
+                    if others.is_empty() && o.is_point() {
+                        self.strays.push((cell(o.at.map(f64::from), self.far), o.what));
+                    }
+                    all.extend(others);
+                }
             }
         }
         self.all = all;
         self.sort();
+    }
+
+    /// Cells of points that are no obstacles, since they are no evidence of an object.
+    #[must_use]
+    pub fn strays(&self) -> StrayCells {
+        let mut cells = self.strays.clone();
+        cells.sort_unstable();
+        cells.dedup();
+        StrayCells { far: self.far, cells }
     }
 
     /// Radius of the largest obstacle, metres.
