@@ -236,9 +236,9 @@ impl Progress {
 
     /// Says how long stages that are to come will take, seconds, in the order in which they will
     /// begin; replaces what was said of the same stages before. The bar shows how far the whole run
-    /// is where this was said.
-    pub(crate) fn expect(&self, stages: &[(&'static str, f64)]) {
-        self.course().expect(stages);
+    /// is where this was said; `is_known` if it is more than a guess.
+    pub(crate) fn expect(&self, stages: &[(&'static str, f64)], is_known: bool) {
+        self.course().expect(stages, is_known);
     }
 
     /// Whether a person watches a bar.

@@ -29,9 +29,9 @@ pub(crate) fn begin(job: &Job, engine: &Engine) {
     let robots = library::bytes(&job.robots) as f64 / 1e6 * LOAD / threads;
     let bytes = |path: &std::path::PathBuf| path.metadata().map_or(0, |file| file.len());
     let n = job.inputs.iter().map(bytes).sum::<u64>() as f64 / FILE_POINT_BYTES;
-    engine.progress.expect(&[("robots", robots)]);
-    engine.progress.expect(&of_points(n, n / READS, job));
-    engine.progress.expect(&[("fit", SEARCHES * robots)]);
+    engine.progress.expect(&[("robots", robots)], false);
+    engine.progress.expect(&of_points(n, n / READS, job), false);
+    engine.progress.expect(&[("fit", SEARCHES * robots)], false);
 }
 
 /// Library and inputs are open; the points are glanced at.
@@ -43,7 +43,7 @@ pub(crate) fn opened(job: &Job, sources: &Sources, n_models: usize, engine: &Eng
     let own = sources.inputs.iter().map(|input| (points(sources, input) as f64, input.format));
     let (n, reading) =
         own.fold((0.0, 0.0), |(n, seconds), (own, format)| (n + own, seconds + own / rate(format)));
-    engine.progress.expect(&of_points(n, reading, job));
+    engine.progress.expect(&of_points(n, reading, job), true);
     // What is wrong with an input is said when it is read.
     if let Ok(seen) = expected_regions::sample(sources, &job.means.settings, engine) {
         search(&seen, n_models, job, engine);
@@ -66,7 +66,7 @@ pub(crate) fn regions(
 
 fn search(seen: &ExpectedRegions, n_models: usize, job: &Job, engine: &Engine) {
     let seconds = search_time::seconds(seen, n_models) / job.means.n_threads as f64;
-    engine.progress.expect(&[("fit", seconds)]);
+    engine.progress.expect(&[("fit", seconds)], true);
 }
 
 /// Stages through which all points go, in their order, with the search among them.

@@ -14,6 +14,9 @@ const OVERDUE: f64 = 0.1;
 /// kept, and says nothing about speed.
 const KEPT: f64 = 0.02;
 
+/// Greatest share of a bar that stands for a guess.
+const GUESSED: f64 = 0.2;
+
 /// A stage of the course.
 #[derive(Debug)]
 struct Leg {
@@ -31,6 +34,8 @@ pub(super) struct Course {
     legs: Vec<Leg>,
     /// The greatest share that was shown: a bar that goes back looks like an error.
     shown: f64,
+    /// Whether the points were looked at; before, a bar that is far would stand still afterwards.
+    is_known: bool,
 }
 
 /// How far a run is.
@@ -44,8 +49,9 @@ pub(super) struct Whole {
 
 impl Course {
     /// Says how long stages will take, in the order in which they will begin; replaces what was
-    /// said of them before.
-    pub(super) fn expect(&mut self, stages: &[(&'static str, f64)]) {
+    /// said of them before. `is_known` if it is more than a guess.
+    pub(super) fn expect(&mut self, stages: &[(&'static str, f64)], is_known: bool) {
+        self.is_known |= is_known;
         for &(name, expected) in stages {
             match self.legs.iter_mut().find(|leg| leg.name == name) {
                 Some(leg) => leg.expected = expected,
@@ -85,8 +91,10 @@ impl Course {
             let expected = leg.expected * pace;
             if leg.name == name { of_stage(expected, share, seconds) } else { expected }
         });
-        let to_go: f64 = rest.sum();
-        self.shown = self.shown.max(elapsed / (elapsed + to_go).max(1e-9));
+        // A sum of nothing is -0.
+        let to_go = rest.sum::<f64>().max(0.0);
+        let most = if self.is_known { 1.0 } else { GUESSED };
+        self.shown = self.shown.max((elapsed / (elapsed + to_go).max(1e-9)).min(most));
         Some(Whole { share: self.shown, to_go })
     }
 
@@ -113,7 +121,7 @@ mod tests {
 
     fn course() -> Course {
         let mut course = Course::default();
-        course.expect(&[("robots", 10.0), ("ingest", 20.0), ("fit", 60.0), ("write", 10.0)]);
+        course.expect(&[("robots", 10.0), ("ingest", 20.0), ("fit", 60.0), ("write", 10.0)], true);
         course
     }
 
@@ -147,9 +155,23 @@ mod tests {
         let slow = course.whole("ingest", 0.0, 0.0, 40.0).expect("a course");
         // Four times as long as expected, less the weight of the expectation.
         assert!((slow.to_go - 90.0 * 45.0 / 15.0).abs() < 1e-9, "{slow:?}");
-        course.expect(&[("fit", 600.0)]);
+        course.expect(&[("fit", 600.0)], true);
         let more = course.whole("ingest", 0.0, 0.0, 40.0).expect("a course");
         assert!(more.to_go > slow.to_go && more.share >= slow.share, "{more:?}");
+    }
+
+    #[test]
+    fn a_guess_moves_the_bar_a_little_only() {
+        let mut course = Course::default();
+        course.expect(&[("robots", 10.0), ("fit", 10.0)], false);
+        course.begin("robots");
+        let guessed = course.whole("robots", 0.9, 9.0, 9.0).expect("a course");
+        assert_eq!(guessed, Whole { share: 0.2, to_go: 11.0 });
+        course.expect(&[("fit", 26.0)], true);
+        assert_eq!(course.whole("robots", 0.9, 9.0, 9.0).map(|w| w.share), Some(0.25));
+        course.end("robots", 10.0);
+        course.end("fit", 26.0);
+        assert!(course.whole("list", 0.0, 0.0, 36.0).is_some_and(|w| w.to_go.is_sign_positive()));
     }
 
     #[test]

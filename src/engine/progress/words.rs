@@ -79,14 +79,17 @@ pub(super) fn bar_line(
     let to_go = whole.map(|w| w.to_go).or_else(|| eta(done, total, seconds));
     let mut words = Vec::new();
     words.extend(to_go.map(|s| format!("about {} to go", time(s))));
-    words.push(match (done.points, total.items) {
-        (0, 0) => count(done.items, "item"),
-        (0, all) => format!("{} of {}", done.items, count(all, "item")),
-        (points, _) => {
-            let share = share.map_or(String::new(), |share| format!("{:.0} % of ", 100.0 * share));
-            let all = if share.is_empty() { points } else { total.points.max(points) };
-            format!("{share}{} points", short(all as f64))
-        }
+    words.extend(match (done.points, done.items, total.items) {
+        (0, 0, 0) => None,
+        (0, items, 0) => Some(count(items, "item")),
+        (0, items, all) => Some(format!("{items} of {}", count(all, "item"))),
+        (points, ..) => Some(match share {
+            Some(share) => {
+                let all = short(total.points.max(points) as f64);
+                format!("{:.0} % of {all} points", 100.0 * share)
+            }
+            None => format!("{} points", short(points as f64)),
+        }),
     });
     if n_known > 0 {
         words.push(format!("{n_done} of {n_known} steps"));
@@ -217,7 +220,7 @@ mod tests {
         );
         assert_eq!(
             bar_line("digest", &StageState::start(&Amount::default()), None, 0.0),
-            "comparing inputs [>               ] 0 items, 0 s so far"
+            "comparing inputs [>               ] 0 s so far"
         );
         assert_eq!([time(7_200.0), time(3_600.0), time(99.0)], ["2.0 h", "60 min", "99 s"]);
     }

@@ -88,3 +88,33 @@ fn names_of_changes_do_not_cover_each_other() {
         [&["WWW"][..], &["WWW", "WWW", "WWW"]].map(|names| dark(&draw(names)) - none);
     assert!(one > 0.0 && three > 2.8 * one, "one name {one}, three {three}");
 }
+
+#[test]
+fn links_have_colours_of_their_own() {
+    let colours: std::collections::BTreeSet<Rgb> = (0..24).map(link_color).collect();
+    assert_eq!(colours.len(), 24);
+}
+
+#[test]
+fn the_plan_shows_what_stands_under_a_ceiling() {
+    use contract::Label;
+    let bounds = Aabb { min: [0.0; 3], max: [4.0, 4.0, 5.0] };
+    let draw = |floor: Option<f64>, ceiling: f64| {
+        let plan = PlanPicture::new(&bounds).over_floor(floor);
+        let level = |z: f64| surface([0.0, 0.0, z], [3.99, 3.99, 0.0]);
+        plan.add(&level(0.0), &vec![Label::FLOOR; 160_000]);
+        for at in [level(ceiling), surface([1.0, 1.0, 0.0], [0.5, 0.5, 0.5])] {
+            plan.add(&at, &vec![Label::FIXED; at.len()]);
+        }
+        plan.draw("hall", &[], &[])
+    };
+    // The upper right quarter of the plan, which has the floor and the ceiling alone.
+    let dark = |canvas: &Canvas| {
+        let side = canvas.width() - 96;
+        let quarter = [58 + side / 2, 106, 38 + side, 86 + side / 2];
+        share(canvas, quarter, |[r, g, b]| r < 190 && g < 190 && b < 190)
+    };
+    let [cut, whole, low] = [(Some(0.0), 4.5), (None, 4.5), (Some(0.0), 2.5)]
+        .map(|(floor, ceiling)| dark(&draw(floor, ceiling)));
+    assert!(cut < 0.1 && whole > 0.9 && low > 0.9, "{cut} {whole} {low}");
+}
