@@ -95,7 +95,7 @@ pub fn draw_changes(cell: &ComparedCell<'_>) -> Canvas {
             ChangeView { axes: [0, 1], corner: [MARGIN, top], size: [width, depth], scale },
         ),
         (
-            "from the south (against y), metres",
+            "from the south (along y), metres",
             ChangeView { axes: [0, 2], corner: [MARGIN, side], size: [width, height], scale },
         ),
     ];
