@@ -8,6 +8,8 @@
 # Scans and robots are mounted read-only; the only folder that is written to is that of the result, which must
 # belong to the user who runs it. Memory of the container should be a gigabyte above `--memory`.
 FROM rust:1.95-slim-bookworm AS build
+# The base image names its release of Debian, which has one version of each package.
+# hadolint ignore=DL3008
 RUN apt-get update -q && apt-get install -y -q --no-install-recommends g++ binutils && rm -rf /var/lib/apt/lists/*
 WORKDIR /source
 COPY . .

@@ -12,7 +12,7 @@ use crate::detect::robots::{FittedRobots, KeptRobots, RobotList};
 use crate::detect::search::{PreparedLibrary, Search};
 use crate::detect::{library, tools};
 use crate::engine::{Engine, Task};
-use crate::estimate::Estimate;
+use crate::estimate::{Estimate, course};
 use crate::job::{Job, Outcome, Settings, units};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
@@ -106,6 +106,7 @@ impl<'a> Run<'a> {
         let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
         let clusters = cluster::split(space, floor, &settings.cluster);
         let regions = base_search::regions(&clusters, &settings.region);
+        course::regions(job, &clusters, &regions, opened.library.models.len(), engine);
 
         // Base poses and postures for each region and model; then compatible fits are chosen.
         let of_plant = || Cache::new(output.fits(), digests.fits_key(&tiles, settings));
@@ -122,8 +123,8 @@ impl<'a> Run<'a> {
         let chosen = self.shards.map(|_| self.chosen(&tiles));
         let find = || self.robots(found.concat(), &search, &opened, &ground);
         let (robots, review) = self.kept_robots(chosen.as_ref(), &opened.library, find)?;
-        let spaces = KnownSpaces { robots: robots.view(), search: &search, settings };
-        let spaces = spaces.all(chosen.as_ref(), engine)?;
+        let spaces = KnownSpaces { robots: robots.view(), search: &search, settings }
+            .all(chosen.as_ref(), engine)?;
         drop(library);
 
         // Tiles near robots are read again; then all points.
@@ -152,6 +153,7 @@ impl<'a> Run<'a> {
     /// Reads library and review, opens the scans, and checks disk and memory.
     pub(crate) fn open(&self, models_kept: &Cache) -> Result<Opened> {
         let &Run { job, settings, output, digests, engine, .. } = self;
+        course::begin(job, engine);
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let review = Review::of(job, &library.models)?;
         let looks = KeptLooks { digests, settings, folder: output.looks() };
@@ -164,6 +166,7 @@ impl<'a> Run<'a> {
             key.is_some_and(|key| output.has_tiles(&key))
         };
         Estimate::of(job, &sources, library.models.len(), has_tiles).checked(output.out())?;
+        course::opened(job, &sources, library.models.len(), engine);
         Ok(Opened { library, review, sources })
     }
 

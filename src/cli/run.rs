@@ -12,7 +12,6 @@ use crate::rescan::{self, Cell, Frame, RescanRequest};
 use crate::result::run_record::{MeasuredRun, RunRecord};
 use contract::{Error, Kind, Result};
 use geometry::Aabb;
-use std::fmt::Write as _;
 use std::num::NonZeroUsize;
 use std::time::Instant;
 
@@ -32,7 +31,7 @@ pub(super) fn ended(
     say: &Say,
 ) -> u8 {
     record(job, engine, started, &outcome, say);
-    let _ = writeln!(outcome.summary, "result in {}", job.out.join("result.json").display());
+    outcome.summary += &where_to_look(job);
     say.outcome(&outcome);
     if outcome.partial { exit::PARTIAL } else { exit::OK }
 }
@@ -71,9 +70,17 @@ pub(super) fn rescan(flags: &RescanFlags, common: &Common, say: &Say) -> Result<
     let started = Instant::now();
     let mut outcome = rescan::rescan(&request, &engine)?;
     record(&request.job, &engine, started, &outcome, say);
-    let _ = writeln!(outcome.summary, "result in {}", flags.out.join("result.json").display());
+    outcome.summary += &where_to_look(&request.job);
     say.outcome(&outcome);
     Ok(if outcome.partial { exit::PARTIAL } else { exit::OK })
+}
+
+/// Where data are for programs, and the page for people.
+fn where_to_look(job: &Job) -> String {
+    let data = format!("result in {}\n", job.out.join("result.json").display());
+    let page = job.means.settings.export.page.then(|| job.out.join(crate::cache::PAGE));
+    page.iter()
+        .fold(data, |data, page| format!("{data}to look at in a browser: {}\n", page.display()))
 }
 
 /// Keeps times and memory of a run beside its result. A run whose record cannot be kept is as good.

@@ -1,17 +1,19 @@
 //! Progress of stages on standard error, as bars, lines or JSON, and one report per stage for the
 //! result. Only this module reads a clock.
 
+mod course;
 mod words;
 
 use super::amount::Amount;
 use contract::quote;
+use course::Course;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::time::{Duration, Instant};
 pub(crate) use words::title;
-use words::{StageState, json, words};
+use words::{StageState, bar_line, json, words};
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -41,14 +43,12 @@ const JSON_EVERY: Duration = Duration::from_secs(1);
 /// Time between two redraws of a bar.
 const BAR_EVERY: Duration = Duration::from_millis(120);
 
-/// Steps of a bar from end to end.
-const BAR_STEPS: u64 = 1000;
-
-/// The bar of a run: the stage's name, how far it is, and words.
+/// The bar of a run. Its whole line is one message, so that name, bar and words always belong to
+/// one stage; it is cut at the width of the terminal.
 fn only_bar() -> ProgressBar {
-    let bar = ProgressBar::new(BAR_STEPS);
-    if let Ok(style) = ProgressStyle::with_template("{prefix} [{bar:16}] {wide_msg}") {
-        bar.set_style(style.progress_chars("=> "));
+    let bar = ProgressBar::new(0);
+    if let Ok(style) = ProgressStyle::with_template("{wide_msg}") {
+        bar.set_style(style);
     }
     bar
 }
@@ -83,6 +83,8 @@ struct Inner {
     bar: Option<ProgressBar>,
     /// Whether stages that have ended leave a line above the bar.
     tells_stages: bool,
+    /// What the run will probably go through.
+    course: Mutex<Course>,
     /// Number of stages that have begun and not ended.
     n_running: AtomicUsize,
     start: Instant,
@@ -192,6 +194,7 @@ impl Progress {
             bars,
             bar,
             tells_stages,
+            course: Mutex::default(),
             n_running: AtomicUsize::new(0),
             start: Instant::now(),
         }))
@@ -207,8 +210,13 @@ impl Progress {
     /// Like [`Progress::stage`], for a stage that also shows `pieces` of its items.
     #[must_use]
     pub fn stage_of(&self, name: &str, total: Amount, pieces: Pieces) -> Stage {
-        if self.0.n_running.fetch_add(1, Ordering::Relaxed) == 0 {
-            self.0.bar.iter().for_each(ProgressBar::reset);
+        self.course().begin(name);
+        let is_first = self.0.n_running.fetch_add(1, Ordering::Relaxed) == 0;
+        if let Some(bar) = self.0.bar.as_ref().filter(|_| is_first) {
+            // What the bar said before it was wiped away is of another stage.
+            let start = StageState::start(&total);
+            bar.set_message(self.bar_line(name, &start));
+            bar.reset();
         }
         let stage = Stage(Arc::new(Running {
             progress: self.clone(),
@@ -224,6 +232,31 @@ impl Progress {
         // Pieces stay with the first stage that shows them.
         stage.0.pieces.0.stage.set(Arc::downgrade(&stage.0)).ok();
         stage
+    }
+
+    /// Says how long stages that are to come will take, seconds, in the order in which they will
+    /// begin; replaces what was said of the same stages before. The bar shows how far the whole run
+    /// is where this was said; `is_known` if it is more than a guess.
+    pub(crate) fn expect(&self, stages: &[(&'static str, f64)], is_known: bool) {
+        self.course().expect(stages, is_known);
+    }
+
+    /// Whether a person watches a bar.
+    #[must_use]
+    pub(crate) fn has_bar(&self) -> bool {
+        self.0.bar.is_some()
+    }
+
+    fn course(&self) -> MutexGuard<'_, Course> {
+        self.0.course.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The line of the bar while a stage is at work.
+    fn bar_line(&self, name: &str, state: &StageState<'_>) -> String {
+        let elapsed = self.0.start.elapsed().as_secs_f64();
+        let share = state.done.share(state.total).unwrap_or(0.0);
+        let whole = self.course().whole(name, share, state.seconds, elapsed);
+        bar_line(name, state, whole, elapsed)
     }
 
     /// Reports of all finished stages, in the order in which they ended.
@@ -298,6 +331,7 @@ impl Running {
             return;
         }
         let (done, seconds) = (self.done(), self.start.elapsed().as_secs_f64());
+        self.progress.course().end(&self.name, seconds);
         self.show(seconds, true);
         let report = StageReport {
             name: self.name.clone(),
@@ -323,12 +357,7 @@ impl Running {
             }
             return;
         }
-        let share = state.done.share(state.total).unwrap_or(0.0);
-        bar.set_position((share * BAR_STEPS as f64) as u64);
-        bar.set_prefix(title(&self.name).to_owned());
-        let all = inner.start.elapsed().as_secs();
-        bar.set_message(format!("{}; {all} s in all", words(state)));
-        bar.tick();
+        bar.set_message(self.progress.bar_line(&self.name, state));
     }
 
     fn show(&self, seconds: f64, last: bool) {
@@ -372,77 +401,4 @@ impl Drop for Running {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[derive(Clone, Default)]
-    struct Page(Arc<Mutex<Vec<u8>>>);
-
-    impl Write for Page {
-        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            self.0.lock().expect("not poisoned").extend_from_slice(bytes);
-            Ok(bytes.len())
-        }
-
-        fn flush(&mut self) -> std::io::Result<()> {
-            Ok(())
-        }
-    }
-
-    fn told(mode: Mode) -> (String, Vec<StageReport>) {
-        let page = Page::default();
-        let progress = Progress::to(mode, Box::new(page.clone()));
-        let stage = progress.stage("read", Amount::points(2000));
-        for _ in 0..1000 {
-            stage.add(1, 2, 24);
-        }
-        drop(stage);
-        let bytes = page.0.lock().expect("not poisoned").clone();
-        (String::from_utf8(bytes).expect("text"), progress.reports())
-    }
-
-    #[test]
-    fn a_short_stage_is_one_line_and_one_report() {
-        let (text, reports) = told(Mode::Plain);
-        assert_eq!(text.lines().count(), 1, "{text}");
-        assert!(text.starts_with("reading scans: 100 %, 2.00 k points"), "{text}");
-        assert_eq!(
-            (reports[0].n_items, reports[0].n_points, reports[0].bytes),
-            (1000, 2000, 24000)
-        );
-        assert_eq!(told(Mode::None).0, "");
-        assert_eq!(told(Mode::None).1.len(), 1);
-    }
-
-    #[test]
-    fn pieces_of_an_item_are_told_while_none_of_the_items_is_done() {
-        let page = Page::default();
-        let progress = Progress::to(Mode::Json, Box::new(page.clone()));
-        let pieces = Pieces::default();
-        let stage = progress.stage_of("fit", Amount::items(3), pieces.clone());
-        // As if a second had gone by.
-        stage.0.next_line.store(0, Ordering::Relaxed);
-        pieces.expect(8);
-        stage.0.next_line.store(0, Ordering::Relaxed);
-        pieces.done();
-        let bytes = page.0.lock().expect("not poisoned").clone();
-        let text = String::from_utf8(bytes).expect("text");
-        let last: serde_json::Value =
-            serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
-        assert_eq!((&last["items"], &last["event"]), (&0.into(), &"progress".into()));
-        assert_eq!((&last["pieces"], &last["pieces_known"]), (&1.into(), &8.into()));
-        drop(stage);
-        // The stage has ended, so nothing is shown.
-        pieces.done();
-    }
-
-    #[test]
-    fn json_lines_are_json() {
-        let (text, _) = told(Mode::Json);
-        let last: serde_json::Value =
-            serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
-        assert_eq!(last["event"], "stage_end");
-        assert_eq!(last["points"], 2000);
-        assert_eq!(last["items_total"], serde_json::Value::Null);
-    }
-}
+mod tests;

@@ -106,7 +106,7 @@ fn regions_of(seen: &[(Vec<[f64; 3]>, f64)], settings: &Settings) -> ExpectedReg
 }
 
 /// Size, points and voxels of the clusters in a region.
-fn searched(clusters: &[Cluster], region: &Region) -> ExpectedRegion {
+pub(super) fn searched(clusters: &[Cluster], region: &Region) -> ExpectedRegion {
     let world = region.world_bounds();
     let mut out = ExpectedRegion { size: region.bounds.size(), n_points: 0, n_voxels: 0 };
     for cluster in clusters.iter().filter(|c| c.bounds.touches(&world)) {

@@ -1,6 +1,7 @@
 //! Estimates memory, disk and time of a job, and what an earlier run has left for it. A sample of
 //! the points tells how much there is to search.
 
+pub(crate) mod course;
 mod expected_regions;
 mod nodes;
 mod rates;

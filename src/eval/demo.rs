@@ -72,7 +72,11 @@ pub fn run(
         ))
     );
     if out.is_some() {
-        let _ = writeln!(summary, "everything is in {}; look at result/pictures", dir.display());
+        let _ = writeln!(
+            summary,
+            "everything is in {0}; to look at in a browser: {0}/result/report.html",
+            dir.display()
+        );
     } else {
         let _ = writeln!(summary, "`stillpoint demo --out DIR` keeps scene, scans and results");
     }

@@ -275,7 +275,9 @@ impl<'a> Labelling<'a> {
         let shown: Vec<Aabb> = robots.iter().map(|r| *r.bounds()).collect();
         let (disks, mut pictures) = (engine.disks()?, Vec::new());
         for input in self.read_inputs(scope) {
-            let plan = PlanPicture::new(&self.bounds_of(input.id));
+            let heights = self.floor.levels.iter().flat_map(|level| &level.heights);
+            let highest = heights.map(|(_, height)| *height).max_by(f64::total_cmp);
+            let plan = PlanPicture::new(&self.bounds_of(input.id)).over_floor(highest);
             let label = LabelStrip {
                 near: &near.labels,
                 ground: &self.ground,

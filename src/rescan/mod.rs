@@ -11,6 +11,7 @@ mod known_space;
 mod new_points;
 mod other_model;
 mod output;
+mod picture;
 mod report;
 mod robots;
 mod session;

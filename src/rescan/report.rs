@@ -2,6 +2,7 @@
 //! the summary for people.
 
 use super::found::RescanFindings;
+use super::picture;
 use crate::cache::Digests;
 use crate::detect::robot_id::robot_id;
 use crate::job::Outcome;
@@ -13,8 +14,7 @@ use change::UnobservedRegion;
 use contract::words::{count, fixed, triple};
 use contract::{Error, Kind, Result, quote};
 use export::{
-    CarriedEntry, ChangedThing, LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels,
-    draw_changes, write_table,
+    CarriedEntry, LabelFiles, RegistrationEntry, RescanEntry, ResultFile, ScanLabels, write_table,
 };
 use register::Registration;
 use serde_json::json;
@@ -61,7 +61,7 @@ impl RescanReport<'_, '_> {
             .map_err(|e| Error::new(Kind::Bug, "changes cannot be written").because(e))?;
         export::atomic::write(&next.join("changes.json"), (text + "\n").as_bytes())?;
         export::atomic::write(&next.join("changes.csv"), self.csv(&robots).as_bytes())?;
-        self.draw(&robots).write(&next.join("pictures/changes.png"))?;
+        picture::draw(self.found, &robots).write(&next.join("pictures/changes.png"))?;
         result.write(next)?;
         let summary = self.summary(&robots);
         Ok(Outcome { summary, warnings: result.warnings, ..Outcome::default() })
@@ -221,31 +221,6 @@ impl RescanReport<'_, '_> {
         let p =
             at.map(|i| self.found.fits[i].world_from_base.translation.vector).unwrap_or_default();
         format!("{:.3},{:.3},{:.3}", p.x, p.y, p.z)
-    }
-
-    fn draw(&self, changes: &[RobotChange]) -> export::Canvas {
-        let things = self.found.labels.things.iter().enumerate().map(|(k, thing)| ChangedThing {
-            name: format!("T{} {}", k + 1, word(thing.change)),
-            gone: change::SessionOccupancy::centres(&thing.gone),
-            filled: change::SessionOccupancy::centres(&thing.filled),
-            at: thing.now.or(thing.then).map(|b| b.center().into()).unwrap_or_default(),
-        });
-        let robots = self.found.robots.compared().into_iter().map(|i| {
-            let p = self.found.fits[i].world_from_base.translation.vector;
-            let own = Some(robot_id(i));
-            let change = changes.iter().find(|c| c.now == own || c.now.is_none() && c.then == own);
-            let word = change.map(|c| &c.change).filter(|c| **c != Change::Same);
-            let word = word.map_or_else(String::new, |change| format!(" {}", change.word()));
-            (format!("{}{word}", robot_id(i)), [p.x, p.y])
-        });
-        let unseen = self.found.labels.unseen.iter().flat_map(|region| &region.cells);
-        let unseen: Vec<_> = unseen.copied().collect();
-        draw_changes(
-            &self.found.session.past.cell,
-            [&self.found.labels.now.solid(), &change::SessionOccupancy::centres(&unseen)],
-            &things.collect::<Vec<_>>(),
-            &robots.collect::<Vec<_>>(),
-        )
     }
 
     fn summary(&self, robots: &[RobotChange]) -> String {

@@ -63,12 +63,7 @@ impl Report<'_> {
             version: env!("CARGO_PKG_VERSION").into(),
             robots,
             labels,
-            inputs: self
-                .sources
-                .inputs
-                .iter()
-                .map(|i| input_entry(self.sources, i, self.digests, &self.written.masks))
-                .collect(),
+            inputs: self.sources.inputs.iter().map(|input| self.input(input)).collect(),
             stages: self.stages(),
             warnings: warnings.clone(),
             review: self.review.clone(),
@@ -113,6 +108,17 @@ impl Report<'_> {
     fn scans(&self) -> impl Iterator<Item = &Scan> {
         let has_points = |scan: &&Scan| self.store.entries().iter().any(|e| e.at.scan == scan.id);
         self.sources.scans.iter().filter(has_points)
+    }
+
+    /// The entry of an input. A scan without points, such as the rest of a cloud whose points are all
+    /// of known scanners, has nothing that could be missing.
+    fn input(&self, input: &Input) -> InputEntry {
+        let scans: Vec<&Scan> = self.scans().filter(|scan| scan.input == input.id).collect();
+        InputEntry {
+            n_scans: scans.len() as u32,
+            notes: scans.iter().flat_map(|scan| &scan.notes).cloned().collect(),
+            ..input_entry(self.sources, input, self.digests, &self.written.masks)
+        }
     }
 
     /// Findings about models that could not be loaded.

@@ -14,6 +14,8 @@ mod frames;
 mod guide;
 mod mesh;
 mod moved;
+#[cfg(target_os = "linux")]
+mod pseudo_terminal;
 mod rescan;
 mod review;
 mod scanners;

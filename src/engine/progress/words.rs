@@ -1,7 +1,11 @@
 //! Text of a progress line for people, and the JSON object of the same state for programs.
 
+use super::course::Whole;
 use crate::engine::amount::Amount;
 use contract::words::count;
+
+/// Width of the bar, columns.
+const BAR: usize = 16;
 
 /// Estimated seconds that remain, at the average rate so far; `None` where no total is known.
 fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
@@ -43,6 +47,64 @@ pub(super) struct StageState<'a> {
     pub(super) cpu_seconds: f64,
     /// Whether the stage has ended.
     pub(super) is_over: bool,
+}
+
+impl<'a> StageState<'a> {
+    /// The state of a stage that begins.
+    pub(super) fn start(total: &'a Amount) -> Self {
+        const NOTHING: &Amount = &Amount { items: 0, points: 0, bytes: 0 };
+        let (seconds, cpu_seconds) = (0.0, 0.0);
+        Self { done: NOTHING, total, pieces: [0; 2], seconds, cpu_seconds, is_over: false }
+    }
+}
+
+/// The line of the bar: the stage, how far the whole run is or else the stage, the time to go, and
+/// what is done. What matters most stands first, since a narrow terminal cuts the line.
+pub(super) fn bar_line(
+    name: &str,
+    state: &StageState<'_>,
+    whole: Option<Whole>,
+    elapsed: f64,
+) -> String {
+    let &StageState { done, total, pieces: [n_done, n_known], seconds, .. } = state;
+    let share = done.share(total);
+    let full = (whole.map_or(share.unwrap_or(0.0), |w| w.share) * BAR as f64) as usize;
+    let bar: String = (0..BAR)
+        .map(|at| match at {
+            at if at < full => '=',
+            at if at == full => '>',
+            _ => ' ',
+        })
+        .collect();
+    let to_go = whole.map(|w| w.to_go).or_else(|| eta(done, total, seconds));
+    let mut words = Vec::new();
+    words.extend(to_go.map(|s| format!("about {} to go", time(s))));
+    words.extend(match (done.points, done.items, total.items) {
+        (0, 0, 0) => None,
+        (0, items, 0) => Some(count(items, "item")),
+        (0, items, all) => Some(format!("{items} of {}", count(all, "item"))),
+        (points, ..) => Some(match share {
+            Some(share) => {
+                let all = short(total.points.max(points) as f64);
+                format!("{:.0} % of {all} points", 100.0 * share)
+            }
+            None => format!("{} points", short(points as f64)),
+        }),
+    });
+    if n_known > 0 {
+        words.push(format!("{n_done} of {n_known} steps"));
+    }
+    words.push(format!("{} so far", time(elapsed)));
+    format!("{} [{bar}] {}", title(name), words.join(", "))
+}
+
+/// A time for people: no more digits than they read.
+fn time(seconds: f64) -> String {
+    match seconds {
+        s if s < 99.5 => format!("{s:.0} s"),
+        s if s < 5_970.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
 }
 
 /// The progress as a line for people.
@@ -129,5 +191,37 @@ mod tests {
         assert_eq!(words(&fit), "25 %, 1 item, 17 of 60 pieces known so far, 27 s to go");
         let over = StageState { pieces: [60, 60], is_over: true, ..fit };
         assert_eq!(words(&over), "25 %, 1 item, done in 9.0 s");
+    }
+
+    #[test]
+    fn the_bar_shows_the_whole_run_and_says_first_how_long_it_goes_on() {
+        let state = StageState {
+            done: &Amount::items(1),
+            total: &Amount::items(4),
+            pieces: [17, 60],
+            seconds: 9.0,
+            cpu_seconds: 9.0,
+            is_over: false,
+        };
+        let whole = Whole { share: 0.5, to_go: 130.0 };
+        assert_eq!(
+            bar_line("fit", &state, Some(whole), 128.0),
+            "finding robots [========>       ] about 2 min to go, 1 of 4 items, 17 of 60 steps, 2 min so far"
+        );
+        assert_eq!(
+            bar_line("fit", &StageState { pieces: [0; 2], ..state }, None, 9.0),
+            "finding robots [====>           ] about 27 s to go, 1 of 4 items, 9 s so far"
+        );
+        let (done, total) = (Amount::points(2_500_000), Amount::points(10_000_000));
+        let points = StageState { done: &done, total: &total, pieces: [0; 2], ..state };
+        assert_eq!(
+            bar_line("ingest", &points, None, 9.0),
+            "reading scans [====>           ] about 27 s to go, 25 % of 10.0 M points, 9 s so far"
+        );
+        assert_eq!(
+            bar_line("digest", &StageState::start(&Amount::default()), None, 0.0),
+            "comparing inputs [>               ] 0 s so far"
+        );
+        assert_eq!([time(7_200.0), time(3_600.0), time(99.0)], ["2.0 h", "60 min", "99 s"]);
     }
 }

@@ -6,9 +6,9 @@
 //! poses goes in. Suites and their goals follow METHOD.md §19.
 
 use super::cell::{ScannedCell, Then};
-use super::condition::{DrawnCase, FitMethod, Suites, cases};
+use super::condition::{DrawnCase, FitMethod, Suites, cases, suite_names};
 use super::journal::Journal;
-use super::request::{DrawnCases, chosen};
+use super::request::{DrawnCases, check_suites, chosen};
 use super::score::{AccuracyRow, score};
 use super::{draw, other_tables, plot, table};
 use crate::detect::library;
@@ -38,12 +38,14 @@ pub struct AccuracyBench {
 
 /// Runs the suites and returns the table.
 pub fn accuracy(bench: &AccuracyBench, means: &Means, engine: &Engine) -> Result<String> {
+    // Large libraries take a minute to load.
+    check_suites(&bench.suites, &suite_names())?;
     let temporary = tempfile::tempdir()?;
     let robots = bench.drawn.library(temporary.path())?;
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
     let chosen = chosen(&models, &bench.models)?;
     let numbers = Suites { names: &bench.suites, n_cases: bench.n_cases, drawn: &bench.drawn };
-    let cases = cases(&numbers, &models, &chosen)?;
+    let cases = cases(&numbers, &models, &chosen);
     let mut journal =
         bench.drawn.out.as_deref().map(|dir| Journal::create(dir, "accuracy.jsonl")).transpose()?;
     let library = PreparedLibrary::new(&models);

@@ -169,6 +169,8 @@ struct PlantRow {
 
 /// Runs the suites; returns the table.
 pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<String> {
+    // Large libraries take a minute to load.
+    let cases = cases(bench)?;
     let temporary = tempfile::tempdir()?;
     let robots = bench.drawn.library(temporary.path())?;
     let models = library::load(&robots, &means.settings.robot, None, engine)?.models;
@@ -178,7 +180,7 @@ pub fn plants(bench: &PlantBench, means: &Means, engine: &Engine) -> Result<Stri
     let place = Cases { name: "plant", drawn: &bench.drawn, temporary: temporary.path() };
     let case =
         |row: &mut PlantRow, of: &Drawing, dir: &Path| run(row, of, &known, dir, means, &quiet);
-    place.run(cases(bench)?, case, table, engine)
+    place.run(cases, case, table, engine)
 }
 
 fn cases(bench: &PlantBench) -> Result<Vec<CaseToRun<PlantRow, Drawing>>> {

@@ -32,10 +32,16 @@ pub fn robot_color(robot: usize) -> Rgb {
     COLORS[robot % COLORS.len()]
 }
 
-/// Colour of a link in a view of its robot.
+/// Colour of a link in a view of its robot: darker from the ninth link on, and lighter from the
+/// seventeenth, so that no two of a robot's links have the same.
 #[must_use]
 pub fn link_color(link: usize) -> Rgb {
-    COLORS[link % COLORS.len()]
+    let colour = COLORS[link % COLORS.len()];
+    match link / COLORS.len() % 3 {
+        0 => colour,
+        1 => blend(colour, INK, 0.5),
+        _ => blend(colour, WHITE, 0.5),
+    }
 }
 
 /// Limit of the pixels along a side: ten times the size of the pictures of this program.

@@ -27,7 +27,7 @@ const COLUMNS: [(&str, i64); 4] =
 const NO_LIMITS: [f64; 2] = [-std::f64::consts::TAU, std::f64::consts::TAU];
 /// Number of characters of a line across the page.
 const INDENT: i64 = 24;
-const GREY: Rgb = [150, 154, 162];
+const GREY: Rgb = [96, 102, 110];
 const PALE: Rgb = [226, 229, 234];
 const RED: Rgb = [196, 30, 40];
 const AMBER: Rgb = [176, 106, 0];

@@ -13,6 +13,8 @@ const MIN_CELL: f64 = 0.02;
 const MAX_SIDE: f64 = 2400.0;
 /// Smallest length of the longer side, pixels; cells are drawn larger to reach it.
 const MIN_PIXELS: usize = 900;
+/// Height above the floor up to which what stands still is drawn, metres.
+const SHOWN: f64 = 3.0;
 /// Margin around the plan, pixels.
 const MARGIN: i64 = 48;
 /// Distances of grid lines, metres, and pixels that two of them are apart at least.
@@ -26,6 +28,8 @@ pub struct PlanPicture {
     cell: f64,
     /// Number of cells per metre.
     per_metre: f64,
+    /// Height above which what stands still is left out, metres: a ceiling would hide everything.
+    top: f64,
     width: usize,
     height: usize,
     cells: Vec<PlanCell>,
@@ -68,10 +72,17 @@ impl PlanPicture {
             min: [bounds.min[0], bounds.min[1]],
             cell,
             per_metre: 1.0 / cell,
+            top: f64::INFINITY,
             width,
             height,
             cells: (0..width * height).map(|_| PlanCell::default()).collect(),
         }
+    }
+
+    /// Leaves out what stands still and is higher than this above the floor, whose height is known.
+    #[must_use]
+    pub fn over_floor(self, floor: Option<f64>) -> Self {
+        Self { top: floor.map_or(f64::INFINITY, |floor| floor + SHOWN), ..self }
     }
 
     /// Adds labelled points, world, metres.
@@ -80,7 +91,9 @@ impl PlanPicture {
         let mut last = (None, Label::FIXED);
         let mut n = 0;
         for (p, label) in world.iter().zip(labels) {
-            let now = (self.at([p[0], p[1]]), *label);
+            let is_hidden =
+                p[2] > self.top && matches!(label.kind, PointKind::Fixed | PointKind::Uncertain);
+            let now = (self.at([p[0], p[1]]).filter(|_| !is_hidden), *label);
             if now != last {
                 self.count(last.0, last.1, n);
                 (last, n) = (now, 0);
@@ -118,7 +131,7 @@ impl PlanPicture {
         let zoom = (MIN_PIXELS / self.width.max(self.height)).clamp(1, 8) as i64;
         let (w, h) = (self.width as i64 * zoom, self.height as i64 * zoom);
         let mut canvas =
-            Canvas::new((w.max(420) + 2 * MARGIN) as usize, (h + 3 * MARGIN + 40) as usize);
+            Canvas::new((w.max(420) + 2 * MARGIN) as usize, (h + 3 * MARGIN + 58) as usize);
         let full = self.full();
         for v in 0..self.height {
             for u in 0..self.width {
@@ -214,6 +227,10 @@ impl PlanPicture {
         ];
         let reach = "circles: reach, lines: outlines of robots; grid in metres";
         canvas.text(MARGIN, y + 26, Body, INK, reach);
+        if self.top.is_finite() {
+            let cut = format!("without what stands still higher than {SHOWN} m above the floor");
+            canvas.text(MARGIN, y + 44, Body, INK, &cut);
+        }
         let mut x = MARGIN + pixels.max(48) + 24;
         for (name, color) in legend {
             canvas.fill(x, y + 7, 10, 10, color);
