@@ -36,11 +36,11 @@ struct TurnedBase {
     /// Share of its surface by which a yaw may explain less than the one found: the best may lie
     /// between two.
     short: f64,
-    /// Most turned bases that are refined.
+    /// Most turned bases that are refined: a square foot has three beside its own.
     most: usize,
 }
 
-const TURNED: TurnedBase = TurnedBase { n_yaws: 180, tolerance: 0.5, short: 0.05, most: 2 };
+const TURNED: TurnedBase = TurnedBase { n_yaws: 180, tolerance: 0.5, short: 0.05, most: 4 };
 
 /// Hypotheses of a new search that are refined.
 const N_AGAIN: usize = 10;
