@@ -1,0 +1,64 @@
+//! Rooms measured by several scanners, their points without order.
+
+use super::{FoundRasters, find_unordered};
+use crate::tests::{PLAIN, Random, Room, scan};
+use contract::OneByOne;
+use geometry::Vector;
+
+/// No column is left out.
+const ALL_COLUMNS: i32 = 1;
+
+/// Points of a drawn room in a drawn order, with the places of its scanners.
+fn shuffled(seed: u64, n_scanners: usize) -> (Vec<[f32; 3]>, Vec<Vector>) {
+    let mut random = Random::new(seed);
+    let room = Room::drawn(&mut random);
+    let places: Vec<Vector> = (0..n_scanners).map(|_| room.place(&mut random)).collect();
+    let errors = crate::tests::Errors { step: 0.0042, ..PLAIN };
+    let mut points: Vec<[f32; 3]> = Vec::new();
+    for at in &places {
+        let own = scan(&room, at, errors, ALL_COLUMNS, &mut random);
+        points.extend(own.iter().map(|p| p.map(|v| v as f32)));
+    }
+    for i in (1..points.len()).rev() {
+        points.swap(i, random.between(0.0, (i + 1) as f64) as usize);
+    }
+    (points, places)
+}
+
+fn errors(found: &FoundRasters, places: &[Vector]) -> Vec<f64> {
+    let off = |at: Vector| places.iter().map(|p| (p - at).norm()).fold(f64::INFINITY, f64::min);
+    found.setups.iter().map(|s| off(s.world_from_scanner.translation.vector)).collect()
+}
+
+#[test]
+fn scanners_are_found_in_points_without_order() {
+    let (points, places) = shuffled(41, 2);
+    let found = find_unordered(&points, &OneByOne);
+    let errors = errors(&found, &places);
+    assert_eq!(errors.len(), 2, "{found:?}");
+    assert!(errors.iter().all(|e| *e < 0.001), "{errors:?} {found:?}");
+    let stated = |s: &super::RasterSetup| s.sigma.iter().all(|v| *v > 0.0 && *v < 0.001);
+    assert!(found.setups.iter().all(stated), "{found:?}");
+    // One point of four, and the order of their places instead of a drawn one.
+    let mut few: Vec<[f32; 3]> = points.iter().copied().step_by(4).collect();
+    few.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let found = find_unordered(&few, &OneByOne);
+    assert!(self::errors(&found, &places).iter().all(|e| *e < 0.003), "{found:?}");
+}
+
+#[test]
+fn what_shows_no_raster_is_unknown() {
+    let (points, _) = shuffled(43, 2);
+    let walls: Vec<[f32; 3]> = points.iter().copied().filter(|p| p[2] > 0.4).collect();
+    let found = find_unordered(&walls, &OneByOne);
+    assert!(found.setups.is_empty() && found.cause.is_some(), "{found:?}");
+    // Points that scatter by a centimetre in all directions lie on no raster.
+    let mut random = Random::new(44);
+    let mut scattered = |p: &[f32; 3]| p.map(|v| v + 0.01 * random.normal() as f32);
+    let moved: Vec<[f32; 3]> = points.iter().map(&mut scattered).collect();
+    let found = find_unordered(&moved, &OneByOne);
+    assert!(found.setups.is_empty() && found.cause.is_some(), "{found:?}");
+    assert!(find_unordered(&[[1.0, 2.0, 3.0]; 5000], &OneByOne).setups.is_empty());
+    assert!(find_unordered(&[[f32::NAN; 3]; 5000], &OneByOne).setups.is_empty());
+    assert!(find_unordered(&[], &OneByOne).setups.is_empty());
+}
