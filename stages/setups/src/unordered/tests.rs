@@ -13,7 +13,8 @@ fn shuffled(seed: u64, n_scanners: usize) -> (Vec<[f32; 3]>, Vec<Vector>) {
     let mut random = Random::new(seed);
     let room = Room::drawn(&mut random);
     let places: Vec<Vector> = (0..n_scanners).map(|_| room.place(&mut random)).collect();
-    let errors = crate::tests::Errors { step: 0.0042, ..PLAIN };
+    let mut errors = PLAIN;
+    errors.step = 0.005;
     let mut points: Vec<[f32; 3]> = Vec::new();
     for at in &places {
         let own = scan(&room, at, errors, ALL_COLUMNS, &mut random);
@@ -49,7 +50,14 @@ fn scanners_are_found_in_points_without_order() {
 #[test]
 fn what_shows_no_raster_is_unknown() {
     let (points, _) = shuffled(43, 2);
-    let walls: Vec<[f32; 3]> = points.iter().copied().filter(|p| p[2] > 0.4).collect();
+    let end = |a: usize, side: f32| points.iter().map(|p| side * p[a]).fold(0.0, f32::max);
+    let ends = [[end(0, -1.0), end(0, 1.0)], [end(1, -1.0), end(1, 1.0)]];
+    let is_wall = |p: &[f32; 3]| {
+        let near = |a: usize| -p[a] > ends[a][0] - 0.02 || p[a] > ends[a][1] - 0.02;
+        (near(0) || near(1)) && p[2] > 0.1
+    };
+    let walls: Vec<[f32; 3]> = points.iter().copied().filter(is_wall).collect();
+    assert!(walls.len() > 50_000);
     let found = find_unordered(&walls, &OneByOne);
     assert!(found.setups.is_empty() && found.cause.is_some(), "{found:?}");
     // Points that scatter by a centimetre in all directions lie on no raster.
