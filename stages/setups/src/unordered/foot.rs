@@ -36,7 +36,7 @@ pub(crate) fn place(points: &[[f64; 3]], about: [f64; 2], half: i32, step: f64) 
         for p in points {
             let (x, y) = (p[0] - at[0], p[1] - at[1]);
             let r = x.hypot(y);
-            if r < RING[0] || r > RING[1] {
+            if !(RING[0]..=RING[1]).contains(&r) {
                 continue;
             }
             let a = y.atan2(x) + TAU / 2.0;

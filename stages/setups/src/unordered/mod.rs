@@ -33,7 +33,7 @@ const AT_ONCE: usize = 12;
 /// Largest number of candidates.
 const MOST_CANDIDATES: usize = 600;
 /// Share of explained points from which on nothing is said to be missing.
-const EXPLAINED: f64 = 0.85;
+const EXPLAINED: f64 = 0.8;
 /// Number of points that are compared all round a candidate.
 const LOOKED: usize = 200_000;
 
