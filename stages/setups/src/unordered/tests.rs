@@ -48,8 +48,8 @@ fn scanners_are_found_in_points_without_order() {
 }
 
 #[test]
-fn what_shows_no_raster_is_unknown() {
-    let (points, _) = shuffled(43, 2);
+fn nothing_is_invented() {
+    let (points, places) = shuffled(43, 2);
     let end = |a: usize, side: f32| points.iter().map(|p| side * p[a]).fold(0.0, f32::max);
     let ends = [[end(0, -1.0), end(0, 1.0)], [end(1, -1.0), end(1, 1.0)]];
     let is_wall = |p: &[f32; 3]| {
@@ -58,8 +58,9 @@ fn what_shows_no_raster_is_unknown() {
     };
     let walls: Vec<[f32; 3]> = points.iter().copied().filter(is_wall).collect();
     assert!(walls.len() > 50_000);
+    // A level band of the walls may do for a floor; what it gives must be right.
     let found = find_unordered(&walls, &OneByOne);
-    assert!(found.setups.is_empty() && found.cause.is_some(), "{found:?}");
+    assert!(errors(&found, &places).iter().all(|e| *e < 0.002), "{found:?}");
     // Points that scatter by a centimetre in all directions lie on no raster.
     let mut random = Random::new(44);
     let mut scattered = |p: &[f32; 3]| p.map(|v| v + 0.01 * random.normal() as f32);
