@@ -105,7 +105,10 @@ fn text(sources: &Sources, clouds: &[CloudSetups]) -> String {
         }
         if let Some(cause) = &cloud.unknown {
             let share = fixed(100.0 * (1.0 - cloud.explained), 0);
-            let _ = writeln!(text, "  unknown for about {share} % of the points: {cause}");
+            let is_part = cloud.explained < 0.995;
+            let what = format!("unknown for about {share} % of the points");
+            let what = if is_part { what } else { "not for a run".to_owned() };
+            let _ = writeln!(text, "  {what}: {cause}");
         }
     }
     text.trim_end().to_owned()

@@ -2,12 +2,13 @@
 
 use super::owned::Ownership;
 use super::stretches;
+use super::unordered;
 use super::words;
 use crate::engine::{AllThreads, Engine};
 use contract::{Format, MaskId, Result, Scan, ScannerPosition};
 use ingest::{KnownScanner, PointWindow, Sources, WindowSample};
 use serde::Serialize;
-use setups::{FoundSetups, ScanWindow, Setup};
+use setups::{FoundSetups, RasterSetup, ScanWindow, Setup};
 use std::path::Path;
 
 /// Number of windows of a cloud that are looked at first, and where these leave much unexplained or
@@ -18,6 +19,10 @@ const WINDOW_POINTS: u64 = 512;
 const PER_SETUP: usize = 60;
 /// Share of windows without a setup above which more are read.
 const UNEXPLAINED: f64 = 0.1;
+/// Fewest windows of a cloud that is looked at without its order.
+const FEWEST_WINDOWS: usize = 12;
+/// Distance within which setups that are found with and without order are one, metres.
+const SAME_PLACE: f64 = 0.2;
 /// Largest standard deviation of a position that is used, metres: free space is judged to a few
 /// millimetres. Right combs of scanners state less than a millimetre; of 744 drawn setups one was
 /// wrong, by 24 mm at a stated 4.6 mm.
@@ -105,14 +110,68 @@ fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
     let setups: Vec<SetupOfCloud> =
         setups.map(|(setup, own)| setup_of_cloud(setup, own, &name)).collect();
     let n_usable = setups.iter().filter(|setup| setup.is_usable).count();
-    Ok(CloudSetups {
+    let mut cloud = CloudSetups {
         mask: scan.mask,
         input: input.path.display().to_string(),
         name: scan.name.clone(),
         setups,
         unknown: words::unknown(&found, is_alone(sources, scan), n_usable),
         explained: n_owned as f64 / windows.len().max(1) as f64,
-    })
+    };
+    if 1.0 - cloud.explained > UNEXPLAINED && windows.len() >= FEWEST_WINDOWS {
+        cloud.add_unordered(sources, scan, &name)?;
+    }
+    Ok(cloud)
+}
+
+impl CloudSetups {
+    /// Adds the setups that are found without the order of the points.
+    fn add_unordered(&mut self, sources: &Sources, scan: &Scan, name: &str) -> Result<()> {
+        let (found, n_points) = unordered::of_scan(sources, scan)?;
+        let in_order = self.unknown.take().unwrap_or_default();
+        let is_known = |setup: &RasterSetup| {
+            let at: [f64; 3] = setup.world_from_scanner.translation.vector.into();
+            let off = |other: &SetupOfCloud| {
+                (0..3).map(|i| (at[i] - other.position[i]).powi(2)).sum::<f64>().sqrt()
+            };
+            self.setups.iter().any(|other| off(other) < SAME_PLACE)
+        };
+        let new: Vec<&RasterSetup> = found.setups.iter().filter(|s| !is_known(s)).collect();
+        self.unknown = match (self.setups.is_empty(), new.is_empty()) {
+            // What order tells stands.
+            (false, true) => Some(in_order).filter(|cause| !cause.is_empty()),
+            _ => Some(words::unknown_unordered(&in_order, &found)),
+        };
+        if !new.is_empty() {
+            self.explained = self.explained.max(found.explained);
+        }
+        let new = new.into_iter().map(|setup| raster_of_cloud(setup, n_points, name));
+        self.setups.extend(new);
+        Ok(())
+    }
+}
+
+/// A setup that was found without the order of the points.
+fn raster_of_cloud(setup: &RasterSetup, n_points: u64, name: &str) -> SetupOfCloud {
+    let axis = setup.world_from_scanner.rotation * geometry::Vector::z();
+    let n_own = (setup.evidence.share * n_points as f64).round() as u64;
+    SetupOfCloud {
+        position: setup.world_from_scanner.translation.vector.into(),
+        sigma: setup.sigma,
+        tilt_deg: axis.z.abs().min(1.0).acos().to_degrees(),
+        row_step_deg: setup.steps[1].to_degrees(),
+        col_step_deg: Some(setup.steps[0].to_degrees()),
+        evidence: words::raster_evidence(setup),
+        is_usable: false,
+        ownership: Ownership::Raster(n_own),
+        entry: KnownScanner {
+            point_source_id: None,
+            name: Some(name.to_owned()),
+            world_from_scan: setup.world_from_scanner,
+            sigma: Some(setup.sigma),
+            places: Vec::new(),
+        },
+    }
 }
 
 /// Windows of a cloud, and the setups in them; more windows where the first leave much open.
@@ -162,7 +221,7 @@ fn setup_of_cloud(setup: &Setup, ownership: Ownership, name: &str) -> SetupOfClo
     let (point_source_id, places) = match &ownership {
         Ownership::Source(id) => (Some(*id), Vec::new()),
         Ownership::Places(places) => (None, places.clone()),
-        Ownership::Whole | Ownership::Untold => (None, Vec::new()),
+        Ownership::Whole | Ownership::Untold | Ownership::Raster(_) => (None, Vec::new()),
     };
     SetupOfCloud {
         position: setup.position(),

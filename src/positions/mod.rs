@@ -3,6 +3,7 @@
 mod clouds;
 mod owned;
 mod stretches;
+mod unordered;
 mod words;
 
 pub use clouds::{CloudSetups, SetupOfCloud, find};

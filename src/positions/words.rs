@@ -1,6 +1,6 @@
 //! What was found and what was not, in words.
 
-use setups::{FoundSetups, Setup};
+use setups::{FoundRasters, FoundSetups, RasterSetup, Setup};
 
 /// The evidence of a setup.
 pub(super) fn evidence(setup: &Setup) -> String {
@@ -14,6 +14,39 @@ pub(super) fn evidence(setup: &Setup) -> String {
         e.n_cells,
         e.elevation_sigma.to_degrees() * 3600.0,
     )
+}
+
+/// The evidence of a setup that was found from points in no order.
+pub(super) fn raster_evidence(setup: &RasterSetup) -> String {
+    let e = &setup.evidence;
+    let [azimuth, elevation] = setup.steps.map(f64::to_degrees);
+    let sigmas = e.angle_sigmas.map(|s| s.to_degrees() * 3600.0);
+    format!(
+        "found without order: {:.0} % of the points lie on a raster of {azimuth:.4}° by {elevation:.4}° \
+         (coherence on the floor {:.2} and {:.2}; clearness {:.0} and {:.0} in {} directions, where \
+         chance stays below {:.0}), to {:.1}″ and {:.1}″",
+        100.0 * e.share,
+        e.coherence[0],
+        e.coherence[1],
+        e.clearness[0],
+        e.clearness[1],
+        e.n_cells,
+        setups::CLEAR_RASTER,
+        sigmas[0],
+        sigmas[1],
+    )
+}
+
+/// Why points without order have no setup, or none that a run can use.
+pub(super) fn unknown_unordered(in_order: &str, found: &FoundRasters) -> String {
+    const UNUSED: &str = "positions were found, but the points are in no order, so that a scanners \
+         file cannot name those of each scanner";
+    match (found.setups.is_empty(), found.cause) {
+        (true, Some(cause)) => format!("{in_order}; {}", cause.words()),
+        (true, None) => in_order.to_owned(),
+        (false, Some(cause)) => format!("{UNUSED}; {}", cause.words()),
+        (false, None) => UNUSED.to_owned(),
+    }
 }
 
 /// Why there is no setup, or none for some points, or why those found cannot be used.

@@ -17,6 +17,8 @@
 //! million clouds, with all places and steps counted that were tried ([`SetupEvidence`]).
 //! Otherwise the answer is *unknown*, with its [`Cause`].
 //!
+//! Points in no order are left to [`find_unordered`], which looks for the raster of angles itself.
+//!
 //! # Example
 //! ```
 //! use setups::{Cause, ScanWindow, SetupLimits, find};
@@ -40,7 +42,11 @@ mod setup;
 #[cfg(test)]
 mod tests;
 mod tune;
+mod unordered;
 
 pub use find::{FoundSetups, find};
 pub use owner::{is_own, owner, owners};
 pub use setup::{Cause, ScanWindow, Setup, SetupEvidence, SetupLimits};
+pub use unordered::{
+    CLEAR_RASTER, FoundRasters, RasterEvidence, RasterSetup, UnorderedCause, find_unordered,
+};

@@ -7,28 +7,28 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::SplitMix64;
 use std::f64::consts::TAU;
 
-struct Random(SplitMix64);
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
-    fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(SplitMix64::seed_from_u64(seed))
     }
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.0.random::<f64>()).ln()).sqrt();
         radius * (TAU * self.0.random::<f64>()).cos()
     }
 }
 
 /// Boxes, the first of which is seen from inside.
-struct Room(Vec<[Vector; 2]>);
+pub(crate) struct Room(Vec<[Vector; 2]>);
 
 impl Room {
-    fn drawn(random: &mut Random) -> Self {
+    pub(crate) fn drawn(random: &mut Random) -> Self {
         let size = Vector::new(
             random.between(9.0, 22.0),
             random.between(7.0, 16.0),
@@ -68,7 +68,7 @@ impl Room {
     }
 
     /// A place for a scanner, not inside or close to furniture.
-    fn place(&self, random: &mut Random) -> Vector {
+    pub(crate) fn place(&self, random: &mut Random) -> Vector {
         let size = self.0[0][1];
         loop {
             let at = Vector::new(
@@ -88,17 +88,17 @@ impl Room {
 
 /// A scanner with the errors of a real one.
 #[derive(Clone, Copy)]
-struct Errors {
+pub(crate) struct Errors {
     noise: f64,
     jitter: f64,
     ripple: f64,
     tilt: f64,
     lost: f64,
-    step: f64,
+    pub(crate) step: f64,
     over_the_top: bool,
 }
 
-const PLAIN: Errors = Errors {
+pub(crate) const PLAIN: Errors = Errors {
     noise: 0.002,
     jitter: 5e-5,
     ripple: 2e-5,
@@ -108,7 +108,14 @@ const PLAIN: Errors = Errors {
     over_the_top: false,
 };
 
-fn scan(room: &Room, at: &Vector, e: Errors, random: &mut Random) -> Vec<[f64; 3]> {
+/// The points of a scanner: the first two of so many columns.
+pub(crate) fn scan(
+    room: &Room,
+    at: &Vector,
+    e: Errors,
+    every: i32,
+    random: &mut Random,
+) -> Vec<[f64; 3]> {
     let turn = UnitQuaternion::from_euler_angles(
         e.tilt * random.normal(),
         e.tilt * random.normal(),
@@ -120,8 +127,7 @@ fn scan(room: &Room, at: &Vector, e: Errors, random: &mut Random) -> Vec<[f64; 3
     let phase = random.between(0.0, 1.0);
     let mut out = Vec::new();
     for col in 0..(turn_of / e.step) as i32 {
-        // One column of eight is enough, with its neighbour.
-        if col % 8 > 1 {
+        if col % every > 1 {
             continue;
         }
         let azimuth = f64::from(col) * e.step;
@@ -150,6 +156,9 @@ fn windows(points: &[[f64; 3]], n: usize) -> Vec<ScanWindow> {
         .collect()
 }
 
+/// One column of eight is enough, with its neighbour.
+const NEIGHBOURS: i32 = 8;
+
 fn error(setup: &Setup, at: &Vector) -> f64 {
     (Vector::from(setup.position()) - at).norm()
 }
@@ -159,7 +168,7 @@ fn drawn(seed: u64, n: usize, errors: Errors) -> (Vec<ScanWindow>, Vec<Vector>) 
     let mut random = Random::new(seed);
     let room = Room::drawn(&mut random);
     let places: Vec<Vector> = (0..n).map(|_| room.place(&mut random)).collect();
-    let scans = places.iter().map(|at| scan(&room, at, errors, &mut random));
+    let scans = places.iter().map(|at| scan(&room, at, errors, NEIGHBOURS, &mut random));
     let points: Vec<[f64; 3]> = scans.flatten().collect();
     (windows(&points, 320 * n), places)
 }

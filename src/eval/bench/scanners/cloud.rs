@@ -29,12 +29,22 @@ pub(super) enum Order {
     Thinned,
     /// None.
     Shuffled,
+    /// None, so many percent of the points.
+    Random(u8),
+    /// One point of each voxel of so many millimetres, by voxels.
+    Voxels(u8),
+    /// The centroid of each voxel of so many millimetres, by voxels.
+    Centroids(u8),
+    /// None, with so many arc seconds of jitter and no ripple.
+    Jitter(u8),
+    /// None, with so many arc seconds of ripple.
+    Ripple(u8),
     /// Of a scanner that is carried along.
     Carried,
 }
 
 impl Order {
-    pub(super) const ALL: [Self; 8] = [
+    pub(super) const ALL: [Self; 20] = [
         Self::Ids,
         Self::Merged,
         Self::Compressed,
@@ -42,11 +52,23 @@ impl Order {
         Self::Tiles,
         Self::Thinned,
         Self::Shuffled,
+        Self::Random(10),
+        Self::Random(30),
+        Self::Voxels(5),
+        Self::Voxels(10),
+        Self::Voxels(20),
+        Self::Centroids(5),
+        Self::Centroids(10),
+        Self::Centroids(20),
+        Self::Jitter(5),
+        Self::Jitter(10),
+        Self::Jitter(20),
+        Self::Ripple(8),
         Self::Carried,
     ];
 
-    pub(super) fn word(self) -> &'static str {
-        match self {
+    pub(super) fn word(self) -> String {
+        let word = match self {
             Self::Ids => "with ids",
             Self::Merged => "without ids",
             Self::Compressed => "without ids, LAZ",
@@ -55,7 +77,13 @@ impl Order {
             Self::Thinned => "30 % kept without ids",
             Self::Shuffled => "shuffled",
             Self::Carried => "carried scanner",
-        }
+            Self::Random(share) => return format!("shuffled, {share} % kept"),
+            Self::Voxels(edge) => return format!("one point a voxel of {edge} mm"),
+            Self::Centroids(edge) => return format!("centroids of voxels of {edge} mm"),
+            Self::Jitter(size) => return format!("shuffled, {size}″ jitter"),
+            Self::Ripple(size) => return format!("shuffled, {size}″ ripple"),
+        };
+        word.to_owned()
     }
 }
 
@@ -83,13 +111,14 @@ impl DrawnCloud {
         seed: u64,
         [least, most]: [usize; 2],
         n_beams: f64,
+        order: Option<Order>,
         engine: &Engine,
     ) -> Result<Self> {
         let mut random = Random::keyed(&[seed, 0x5CA]);
         let n_setups = least + random.below(most - least + 1);
         // A scanner sends beams over 360° by 130°.
         let finest = (360.0 * 130.0 * n_setups as f64 / n_beams).sqrt();
-        let drawn = DrawnScanners {
+        let mut drawn = DrawnScanners {
             n_setups,
             step_deg: random.between(0.08, 0.25).max(finest),
             noise_mm: random.between(1.0, 3.0),
@@ -98,6 +127,13 @@ impl DrawnCloud {
             dropouts: random.between(0.0, 0.1),
             quantum: [1e-4, 1e-4, 1e-3][random.below(3)],
         };
+        match order {
+            Some(Order::Jitter(size)) => {
+                (drawn.jitter_arcsec, drawn.ripple_arcsec) = (f64::from(size), 0.0);
+            }
+            Some(Order::Ripple(size)) => drawn.ripple_arcsec = f64::from(size),
+            _ => {}
+        }
         let mut scene = plant(&of_hall(seed, n_setups, drawn.step_deg), &[])?;
         for scanner in &mut scene.scanners {
             scanner.noise = drawn.noise_mm * 1e-3;
@@ -183,11 +219,21 @@ impl DrawnCloud {
                 chosen.sort_by_key(tile);
             }
             Order::Thinned => chosen.retain(|_| random.unit() < 0.3),
-            Order::Shuffled => {
-                for i in (1..chosen.len()).rev() {
-                    chosen.swap(i, random.below(i + 1));
-                }
+            Order::Centroids(edge) => return self.centroids(f64::from(edge) * 1e-3),
+            Order::Shuffled
+            | Order::Random(_)
+            | Order::Voxels(_)
+            | Order::Jitter(_)
+            | Order::Ripple(_) => shuffle(&mut chosen, &mut random),
+        }
+        match order {
+            Order::Random(share) => chosen.truncate(chosen.len() * usize::from(share) / 100),
+            Order::Voxels(edge) => {
+                let voxel = |i: &usize| self.voxel(*i, f64::from(edge) * 1e-3);
+                chosen.sort_by_key(voxel);
+                chosen.dedup_by_key(|i| voxel(i));
             }
+            _ => {}
         }
         let has_ids = matches!(order, Order::Ids | Order::TilesWithIds);
         let id = |i: &usize| if has_ids { self.scan[*i] + 1 } else { 0 };
@@ -198,6 +244,27 @@ impl DrawnCloud {
             scanners: self.scanners.clone(),
             drawn: self.drawn.clone(),
         }
+    }
+
+    /// The voxel of a point.
+    fn voxel(&self, i: usize, edge: f64) -> [i64; 3] {
+        self.points[i].map(|v| (v / edge).floor() as i64)
+    }
+
+    /// One mean for all points of a voxel, whosever they are.
+    fn centroids(&self, edge: f64) -> Self {
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        order.sort_by_key(|i| (self.voxel(*i, edge), *i));
+        let mut out =
+            Self { scanners: self.scanners.clone(), drawn: self.drawn.clone(), ..Self::default() };
+        for same in order.chunk_by(|a, b| self.voxel(*a, edge) == self.voxel(*b, edge)) {
+            let mean =
+                |a: usize| same.iter().map(|i| self.points[*i][a]).sum::<f64>() / same.len() as f64;
+            out.points.push([0, 1, 2].map(mean));
+            out.scan.push(self.scan[same[0]]);
+            out.ids.push(0);
+        }
+        out
     }
 
     /// Writes the cloud as LAS or LAZ.
@@ -228,6 +295,12 @@ impl DrawnCloud {
         }
         las.finish().map_err(|e: Error| e.at(path.display()))?;
         Ok(path)
+    }
+}
+
+fn shuffle(chosen: &mut [usize], random: &mut Random) {
+    for i in (1..chosen.len()).rev() {
+        chosen.swap(i, random.below(i + 1));
     }
 }
 

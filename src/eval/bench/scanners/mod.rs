@@ -28,6 +28,8 @@ pub struct ScannersBench {
     pub n_beams: f64,
 }
 
+/// Number of points from which on a setup is to be found in any order.
+const LARGE: usize = 1_000_000;
 /// Distance within which a setup that is found is a true one, metres.
 const SAME: f64 = 0.05;
 
@@ -56,15 +58,17 @@ fn hall(
     engine: &Engine,
 ) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| Error::from(e).at(dir.display()))?;
-    let drawn = DrawnCloud::drawn(row.seed, bench.n_setups, bench.n_beams, engine)?;
+    let of = |order| DrawnCloud::drawn(row.seed, bench.n_setups, bench.n_beams, order, engine);
+    let drawn = of(None)?;
     row.drawn = drawn.drawn.clone();
     for order in Order::ALL {
         engine.cancel.check()?;
-        let carried = match order {
+        let other = match order {
             Order::Carried => Some(DrawnCloud::carried(row.seed, engine)?),
+            Order::Jitter(_) | Order::Ripple(_) => Some(of(Some(order))?),
             _ => None,
         };
-        let cloud = carried.as_ref().unwrap_or(&drawn).in_order(order, row.seed);
+        let cloud = other.as_ref().unwrap_or(&drawn).in_order(order, row.seed);
         let path = cloud.write(dir, order)?;
         let nowhere = std::path::PathBuf::new();
         let job = Job::new(vec![path.clone()], nowhere.clone(), nowhere, means.clone());
@@ -87,7 +91,7 @@ fn compared(
     seconds: f64,
 ) -> FoundScanners {
     let mut out = FoundScanners {
-        order: order.word().into(),
+        order: order.word(),
         n_points: cloud.points.len(),
         n_true: cloud.scanners.len(),
         seconds,
@@ -118,6 +122,11 @@ fn compared(
         out.n_wrong += wrong;
     }
     out.n_found = is_found.iter().filter(|found| **found).count();
+    let mut left = vec![0usize; cloud.scanners.len()];
+    let of_scanner = cloud.scan.iter().map(|scan| usize::from(*scan));
+    of_scanner.for_each(|scan| left.get_mut(scan).into_iter().for_each(|n| *n += 1));
+    let large = (0..left.len()).filter(|i| left[*i] >= LARGE);
+    out.n_large = [large.clone().filter(|i| is_found[*i]).count(), large.count()];
     out
 }
 
@@ -136,7 +145,7 @@ impl DrawnCloud {
                 let own = places.iter().flat_map(|[first, last]| *first as usize..=*last as usize);
                 own.filter(|i| *i < self.points.len()).for_each(&mut count);
             }
-            Ownership::Untold => {}
+            Ownership::Untold | Ownership::Raster(_) => {}
         }
         counts
     }

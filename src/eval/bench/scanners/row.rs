@@ -28,6 +28,8 @@ pub(super) struct FoundScanners {
     pub(super) n_true: usize,
     pub(super) n_found: usize,
     pub(super) n_invented: usize,
+    /// Setups of at least a million points that were found, and of all.
+    pub(super) n_large: [usize; 2],
     /// Setups that were found twice.
     pub(super) n_twins: usize,
     /// Distance of each from the truth, and what was stated for it, millimetres.
@@ -73,9 +75,10 @@ impl CaseRow for ScannersRow {
 /// The table: one line for each order of points.
 pub(super) fn table(rows: &[ScannersRow]) -> String {
     let mut text = String::from(
-        "| order | clouds | setups | found | twins | invented | error, mm: median | 95 % | worst | \
+        "| order | clouds | setups | found | of ≥ 1 M points | twins | invented | error, mm: median | \
+         95 % | worst | \
          error by sigma: median | 95 % | points to their setup | to another | s a cloud |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let mut orders: Vec<&str> = Vec::new();
     for order in rows.iter().flat_map(|row| &row.orders) {
@@ -96,6 +99,7 @@ pub(super) fn table(rows: &[ScannersRow]) -> String {
             own().count().to_string(),
             sum(|o| o.n_true).to_string(),
             sum(|o| o.n_found).to_string(),
+            format!("{} of {}", sum(|o| o.n_large[0]), sum(|o| o.n_large[1])),
             sum(|o| o.n_twins).to_string(),
             sum(|o| o.n_invented).to_string(),
             at(&errors, 0.5, 3),
