@@ -22,7 +22,7 @@ use crate::result::plant_state::{PlantState, Records};
 use crate::result::report::Report;
 use crate::result::{copc, page};
 use crate::store::{Store, spatial_tiles};
-use contract::{Cluster, Fit, Input, Result, Space};
+use contract::{Cluster, Fit, Input, Region, Result, Space};
 use export::{COPC, ReviewEntry};
 use ingest::{Before, KeepLooks, Sources};
 use robot::Library;
@@ -103,10 +103,7 @@ impl<'a> Run<'a> {
         let ground_kept = Cache::new(output.fits(), digests.ground_key(&tiles, settings));
         let ground = || Ground::of_tiles(scans, &store, settings, engine);
         let ground = ground_kept.get_or_compute("ground", ground)?;
-        let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
-        let clusters = cluster::split(space, floor, &settings.cluster);
-        let regions = base_search::regions(&clusters, &settings.region);
-        course::regions(job, &clusters, &regions, opened.library.models.len(), engine);
+        let (clusters, regions) = self.regions(&ground, opened.library.models.len());
 
         // Base poses and postures for each region and model; then compatible fits are chosen.
         let of_plant = || Cache::new(output.fits(), digests.fits_key(&tiles, settings));
@@ -148,6 +145,15 @@ impl<'a> Run<'a> {
         let n_kept = [models_kept.n_kept(), input_tiles.n_kept(), fits_kept.n_kept()];
         outcome.reused = cache::reused_in_words(["models", "tiles", "fits"], n_kept);
         Ok(outcome)
+    }
+
+    /// What stands about in the plant, and the regions of it that are searched.
+    fn regions(&self, ground: &Ground, n_models: usize) -> (Vec<Cluster>, Vec<Region>) {
+        let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
+        let clusters = cluster::split(space, floor, &self.settings.cluster);
+        let regions = base_search::regions(&clusters, &self.settings.region);
+        course::regions(self.job, &clusters, &regions, n_models, self.engine);
+        (clusters, regions)
     }
 
     /// Reads library and review, opens the scans, and checks disk and memory.

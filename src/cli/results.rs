@@ -19,6 +19,7 @@ use crate::result::mesh_export::{MeshFormat, MeshRequest, export_mesh};
 use crate::result::page::{page_data, write_page, write_page_with_run};
 use crate::result::scans_back::{ScansBack, give_scans_back};
 use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
+use crate::result::stray_points::Published;
 use crate::result::text_report::text_report;
 use crate::{cache, check};
 use contract::words::count;
@@ -119,7 +120,11 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
             written
         }
         None if flags.to == ExportFormat::Mesh => {
-            let mesh = export_mesh(&mesh_request(flags)?, &means, &engine)?;
+            let (only, library) = (flags.mesh.robot.as_deref(), flags.robots.as_deref());
+            let find_strays = |published: Published<'_>| {
+                check::stray_points(&flags.out, published, only, library, &means, &engine)
+            };
+            let mesh = export_mesh(&mesh_request(flags)?, find_strays, &engine)?;
             mesh.warnings.iter().for_each(|warning| say.warning(warning));
             words = mesh.words;
             mesh.paths
@@ -158,7 +163,6 @@ fn mesh_request(flags: &ExportFlags) -> Result<MeshRequest> {
         robot: robot.clone(),
         with_unknown: *unknown,
         with_convex: *convex,
-        robots: flags.robots.clone(),
     })
 }
 

@@ -1,6 +1,6 @@
-//! What a run tells its bar: how long each of its stages will probably take, by the rates of `plan`.
-//! The more of a run is known, the better: first the size of the files, then the points and a glance
-//! at them, then the regions.
+//! What a run tells its bar: how long each of its stages will probably take, by the rates of
+//! `plan`. The more of a run is known, the better: first the size of the files, then the points and
+//! a glance at them, then the regions.
 
 use super::expected_regions::{self, ExpectedRegions};
 use super::rates::{INGEST, LOAD, PAGE, REST};

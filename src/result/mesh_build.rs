@@ -3,8 +3,8 @@
 
 use super::mesh_chunks::VoxelScratch;
 use super::plant_state::PlantState;
+use super::stray_points::StrayPoints;
 use crate::cache::VerifiedFiles;
-use crate::check::StrayPoints;
 use crate::engine::{Engine, Task};
 use contract::{PointKind, Result, Space, SpaceKind};
 use export::read_tile;

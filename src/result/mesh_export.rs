@@ -10,11 +10,11 @@
 
 use super::mesh_build::{BoundedMesh, MeshedResult, convex, unknown};
 use super::plant_state::PlantState;
+use super::stray_points::{Published, StrayPoints};
 use crate::cache::{EXPORT, VerifiedFiles, tiles_of};
-use crate::check::{StrayPoints, stray_points};
 use crate::engine::Engine;
 use crate::io::own_paths::without_links;
-use crate::job::{Job, Means};
+use crate::job::Job;
 use contract::{Error, Kind, Result, Space};
 use export::ResultFile;
 use geometry::Aabb;
@@ -52,8 +52,6 @@ pub struct MeshRequest {
     pub with_unknown: bool,
     /// Whether convex pieces are written, too.
     pub with_convex: bool,
-    /// Robot library; `None` for that of the run.
-    pub robots: Option<PathBuf>,
 }
 
 impl MeshFormat {
@@ -89,7 +87,7 @@ impl MeshFormat {
 
 /// What was written.
 #[derive(Debug)]
-pub struct MeshOutcome {
+pub(crate) struct MeshOutcome {
     /// Paths of the files.
     pub paths: Vec<PathBuf>,
     /// The mesh in a sentence.
@@ -98,11 +96,16 @@ pub struct MeshOutcome {
     pub warnings: Vec<String>,
 }
 
-/// Writes the mesh.
+/// Writes the mesh, without the stray points that `find_strays` finds; with all points where these
+/// cannot be found, as without the models of the robots.
 ///
 /// # Errors
 /// There is no result, it has no tiles or no such robot, or files cannot be read or written.
-pub fn export_mesh(request: &MeshRequest, means: &Means, engine: &Engine) -> Result<MeshOutcome> {
+pub(crate) fn export_mesh(
+    request: &MeshRequest,
+    find_strays: impl FnOnce(Published<'_>) -> Result<StrayPoints>,
+    engine: &Engine,
+) -> Result<MeshOutcome> {
     let out = &request.out;
     let files = VerifiedFiles::open(out)?;
     // No run can use a result that was copied without its store.
@@ -115,7 +118,8 @@ pub fn export_mesh(request: &MeshRequest, means: &Means, engine: &Engine) -> Res
     let folder = format!("{EXPORT}/mesh");
     let scratch = without_links(out, &format!("{folder}/scratch"))?;
     let mut warnings = Vec::new();
-    let strays = strays(request, (&files, &result, &state), means, engine, &mut warnings);
+    let strays = find_strays(Published { files: &files, result: &result, state: &state });
+    let strays = strays.unwrap_or_else(|error| none_found(&error, &mut warnings));
     let meshed =
         MeshedResult { files: &files, state: &state, tiles, region, free, strays, scratch, engine };
     let found = meshed.within(request.bound, request.triangles, &mut warnings)?;
@@ -157,21 +161,10 @@ pub fn export_mesh(request: &MeshRequest, means: &Means, engine: &Engine) -> Res
     Ok(MeshOutcome { paths, words, warnings })
 }
 
-/// Points that are no obstacles for `check`; none where it cannot be asked, as without the models
-/// of the robots.
-fn strays(
-    request: &MeshRequest,
-    published: (&VerifiedFiles, &ResultFile, &PlantState),
-    means: &Means,
-    engine: &Engine,
-    warnings: &mut Vec<String>,
-) -> StrayPoints {
-    let (only, library) = (request.robot.as_deref(), request.robots.as_deref());
-    let found = stray_points(&request.out, published, only, library, means, engine);
-    found.unwrap_or_else(|error| {
-        warnings.push(format!("single stray points near robots are kept in the mesh: {error}"));
-        StrayPoints::default()
-    })
+/// No stray points, and why.
+fn none_found(error: &Error, warnings: &mut Vec<String>) -> StrayPoints {
+    warnings.push(format!("stray points near robots are kept in the mesh: {error}"));
+    StrayPoints::default()
 }
 
 /// Known space of all robots, and the bounds of that of the requested one.

@@ -110,8 +110,8 @@ impl Report<'_> {
         self.sources.scans.iter().filter(has_points)
     }
 
-    /// The entry of an input. A scan without points, such as the rest of a cloud whose points are all
-    /// of known scanners, has nothing that could be missing.
+    /// The entry of an input. A scan without points, such as the rest of a cloud whose points are
+    /// all of known scanners, has nothing that could be missing.
     fn input(&self, input: &Input) -> InputEntry {
         let scans: Vec<&Scan> = self.scans().filter(|scan| scan.input == input.id).collect();
         InputEntry {

@@ -19,7 +19,7 @@ const GUESSED: f64 = 0.2;
 
 /// A stage of the course.
 #[derive(Debug)]
-struct Leg {
+struct CourseLeg {
     name: &'static str,
     /// Time that it will probably take, seconds.
     expected: f64,
@@ -31,7 +31,7 @@ struct Leg {
 /// The stages that a run will probably go through, in their order.
 #[derive(Debug, Default)]
 pub(super) struct Course {
-    legs: Vec<Leg>,
+    legs: Vec<CourseLeg>,
     /// The greatest share that was shown: a bar that goes back looks like an error.
     shown: f64,
     /// Whether the points were looked at; before, a bar that is far would stand still afterwards.
@@ -55,7 +55,7 @@ impl Course {
         for &(name, expected) in stages {
             match self.legs.iter_mut().find(|leg| leg.name == name) {
                 Some(leg) => leg.expected = expected,
-                None => self.legs.push(Leg { name, expected, took: None, has_begun: false }),
+                None => self.legs.push(CourseLeg { name, expected, took: None, has_begun: false }),
             }
         }
     }
