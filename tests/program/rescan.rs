@@ -201,7 +201,9 @@ fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Val
         let inside: Vec<Vec<f64>> = corners.filter(|at| is_inside(at)).collect();
         let report = std::fs::read_to_string(folder.join("mesh.json")).expect("a report");
         let report: serde_json::Value = serde_json::from_str(&report).expect("it parses");
-        (inside, report["points"].as_u64().expect("a number"))
+        let n = |which: &str| report.pointer(which).and_then(serde_json::Value::as_u64);
+        let strays = n("/left_out/stray_points").expect("a number");
+        (inside, n("/points").expect("a number") + strays)
     };
     let (before, _) = meshed("base");
     let (after, n_meshed) = meshed("again");
