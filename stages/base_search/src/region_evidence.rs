@@ -5,7 +5,7 @@ use contract::{Fan, Region, View};
 use geometry::probe::HIDDEN_PRICE;
 use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 
-use crate::evidence_grid::{EDGE, EvidenceGrid, LEAST, RUNG, WIDE};
+use crate::evidence_grid::{EDGE, EvidenceGrid, RUNG, WIDE};
 use crate::score_grid::{ScoreGrid, Stencil};
 use crate::trial::{HIDDEN, SampleScore, Samples};
 
@@ -97,11 +97,6 @@ impl<'a> RegionEvidence<'a> {
     /// not matter.
     pub(crate) fn is_coarse(&self, tolerance: f32) -> bool {
         self.grid.as_ref().is_none_or(|grid| tolerance >= WIDE * grid.edge)
-    }
-
-    /// Least tolerance that the grid has scores for, metres; zero if there is no grid.
-    pub(crate) fn least_tolerance(&self) -> f32 {
-        self.grid.as_ref().map_or(0.0, |grid| LEAST * grid.edge)
     }
 
     /// Samples of a body at a pose that it is then shifted from, for many quick scores; `None` if
