@@ -7,10 +7,9 @@
 //! one session on bare floor of the other counts against a shift.
 
 use crate::surfels::{Surfel, Surfels};
+use geometry::fourier::{Complex32, Fft, forward, inverse};
 use geometry::{Pose, Vector};
 use nalgebra::Point3;
-use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
@@ -239,11 +238,7 @@ struct Fourier {
 
 impl Fourier {
     fn of(n: [usize; 2]) -> Self {
-        let mut planner = FftPlanner::new();
-        let both = |n: usize, planner: &mut FftPlanner<f32>| {
-            [planner.plan_fft_forward(n), planner.plan_fft_inverse(n)]
-        };
-        Self { n, plans: [both(n[0], &mut planner), both(n[1], &mut planner)] }
+        Self { n, plans: n.map(|n| [forward(n), inverse(n)]) }
     }
 
     fn forward(&self, raster: &[f32]) -> Vec<Complex32> {

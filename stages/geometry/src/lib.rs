@@ -32,6 +32,7 @@ pub mod direction;
 pub mod evidence;
 pub mod faces;
 pub mod field;
+pub mod fourier;
 mod lanes;
 mod level;
 pub mod narrow;

@@ -1,7 +1,6 @@
 //! Whether angles of many cells lie on combs of one step, whatever the phase in each cell.
 
-use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
+use geometry::fourier::{self, Complex32, Fft};
 use std::sync::Arc;
 
 /// Histograms of angles in cells, and the sum of their spectra.
@@ -35,7 +34,7 @@ const IN_CELL: u32 = 6;
 impl CellSpectrum {
     /// For cells of a width in radians.
     pub(crate) fn new(n_cells: usize, n_bins: usize, width: f64) -> Self {
-        let fft = FftPlanner::new().plan_fft_forward(n_bins);
+        let fft = fourier::forward(n_bins);
         let scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
         Self {
             fft,

@@ -3,8 +3,7 @@
 
 use super::floor::{FloorGrid, FloorPoints};
 use contract::Fan;
-use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
+use geometry::fourier::{self, Complex32, Fft};
 use std::sync::Arc;
 
 /// Cells on a side of the image of a square.
@@ -50,8 +49,7 @@ pub(crate) struct FootVote {
 
 /// The waves of all squares of the floor.
 pub(crate) fn waves(floor: &FloorPoints, fan: &dyn Fan) -> Vec<FloorWave> {
-    let mut planner = FftPlanner::new();
-    let fft = planner.plan_fft_forward(SIDE);
+    let fft = fourier::forward(SIDE);
     EDGES.iter().flat_map(|edge| of_squares(floor, *edge, &fft, fan)).collect()
 }
 
