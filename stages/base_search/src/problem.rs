@@ -130,7 +130,8 @@ impl<'a> BaseSearch<'a> {
 
     /// Quick score of surface samples, to exclude most poses; `tolerance` in metres. A thorough
     /// search looks at fine poses in the depth images themselves. So does any other where the
-    /// tolerance is finer than the grid's: with the least one of the grid 2 of 201 robots were lost.
+    /// tolerance is finer than the grid's: with the least one of the grid 2 of 201 robots were
+    /// lost.
     pub(crate) fn quick_score(
         &self,
         samples: Samples<'_>,

@@ -1,5 +1,5 @@
-//! Plans of Fourier transforms. They are made here alone: each crate that makes plans would hold all
-//! kernels of the library, half a megabyte of them.
+//! Plans of Fourier transforms. They are made here alone: each crate that makes plans would hold
+//! all kernels of the library, a megabyte of them.
 
 pub use rustfft::Fft;
 pub use rustfft::num_complex::Complex32;
