@@ -17,7 +17,7 @@ use crate::job::{Job, Outcome, Settings, units};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
 use crate::label::near_robots::NearRobots;
-use crate::positions;
+use crate::positions::{self, CloudOrder};
 use crate::result::plant_state::{PlantState, Records};
 use crate::result::report::Report;
 use crate::result::{copc, page};
@@ -164,7 +164,8 @@ impl<'a> Run<'a> {
         let review = Review::of(job, &library.models)?;
         let looks = KeptLooks { digests, settings, folder: output.looks() };
         let looks = self.shards.is_some().then_some(&looks as &dyn KeepLooks);
-        let sources = positions::open(job, Before::default(), looks, engine)?.sources;
+        let sources =
+            positions::open(job, Before::default(), looks, CloudOrder::Measured, engine)?.sources;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         let has_tiles = |i: &Input| {

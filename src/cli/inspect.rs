@@ -6,7 +6,7 @@ use super::flags::{InspectFlags, present};
 use super::say::Say;
 use crate::engine::AllThreads;
 use crate::job::Job;
-use crate::positions;
+use crate::positions::{self, CloudOrder};
 use contract::Result;
 use ingest::Before;
 use std::path::PathBuf;
@@ -19,7 +19,8 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
     let job = Job::new(flags.inputs.clone(), nowhere.clone(), nowhere, means);
     // A look at headers takes no time: only a person who asks for it waits for more.
     let job = Job { scanners, find_scanners: common.asks_for_scanners(), ..job };
-    let sources = positions::open(&job, Before::default(), None, &engine)?.sources;
+    let sources =
+        positions::open(&job, Before::default(), None, CloudOrder::Measured, &engine)?.sources;
     let descriptions = ingest::describe(&sources, &AllThreads);
     if flags.json {
         let all = serde_json::json!({

@@ -6,7 +6,7 @@ use super::flags::present;
 use super::say::Say;
 use super::scanners_flags::ScannersFlags;
 use crate::job::Job;
-use crate::positions::{self, CloudSetups, SetupOfCloud};
+use crate::positions::{self, CloudOrder, CloudSetups, SetupOfCloud};
 use contract::words::{count, fixed};
 use contract::{Error, Kind, Result, ScannerPosition, quote};
 use export::atomic;
@@ -25,6 +25,7 @@ pub(super) fn scanners(flags: &ScannersFlags, common: &Common, say: &Say) -> Res
         &Job { scanners: None, find_scanners: true, ..job },
         ingest::Before::default(),
         None,
+        CloudOrder::Any,
         &engine,
     )?;
     let clouds = &opened.clouds;

@@ -13,7 +13,7 @@ use crate::cache::{Digests, OutputDir};
 use crate::detect::library;
 use crate::engine::Engine;
 use crate::job::{Job, Settings, memory_words, units};
-use crate::positions;
+use crate::positions::{self, CloudOrder};
 use crate::store::spatial_tiles;
 use contract::words::count;
 use contract::{Error, Input, Kind, Result};
@@ -130,7 +130,8 @@ fn opened(
     engine: &Engine,
 ) -> Result<(Estimate, Sources)> {
     let n_models = library::count(&job.robots)?;
-    let sources = positions::open(job, Before::default(), None, engine)?.sources;
+    let sources =
+        positions::open(job, Before::default(), None, CloudOrder::Measured, engine)?.sources;
     units::check_plan(&job.robots, &sources)?;
     Ok((Estimate::of(job, &sources, n_models, |input| has_tiles(input, &sources)), sources))
 }

@@ -78,21 +78,31 @@ impl CloudSetups {
     }
 }
 
-/// Finds the setups of all clouds whose scanner is not known.
+/// In which clouds setups are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CloudOrder {
+    /// Whose points are in the order of measurement. Others cost seconds a million points, and no
+    /// run uses what is found in them.
+    Measured,
+    /// In all.
+    Any,
+}
+
+/// Finds the setups of all clouds of an order whose scanner is not known.
 ///
 /// # Errors
 /// If an input is broken where it is read.
-pub fn find(sources: &Sources, engine: &Engine) -> Result<Vec<CloudSetups>> {
+pub fn find(sources: &Sources, order: CloudOrder, engine: &Engine) -> Result<Vec<CloudSetups>> {
     let opened = sources.opened();
     let is_open = |scan: &&Scan| opened.iter().any(|input| input.id == scan.input);
     let unknown = sources.scans.iter().filter(is_open);
     let unknown: Vec<&Scan> = unknown
         .filter(|s| s.scanner == ScannerPosition::Unknown && s.stated_points != Some(0))
         .collect();
-    engine.each(unknown, |scan| of_cloud(sources, scan))
+    engine.each(unknown, |scan| of_cloud(sources, scan, order))
 }
 
-fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
+fn of_cloud(sources: &Sources, scan: &Scan, order: CloudOrder) -> Result<CloudSetups> {
     let (windows, found) = looked(sources, scan)?;
     let input = &sources.inputs[scan.input.0 as usize];
     let n_owned = found.owners.iter().filter(|owner| owner.is_some()).count();
@@ -118,7 +128,8 @@ fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
         unknown: words::unknown(&found, is_alone(sources, scan), n_usable),
         explained: n_owned as f64 / windows.len().max(1) as f64,
     };
-    if 1.0 - cloud.explained > UNEXPLAINED && windows.len() >= FEWEST_WINDOWS {
+    let is_open = 1.0 - cloud.explained > UNEXPLAINED && windows.len() >= FEWEST_WINDOWS;
+    if is_open && order == CloudOrder::Any {
         cloud.add_unordered(sources, scan, &name)?;
     }
     Ok(cloud)

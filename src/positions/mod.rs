@@ -6,7 +6,7 @@ mod stretches;
 mod unordered;
 mod words;
 
-pub use clouds::{CloudSetups, SetupOfCloud, find};
+pub use clouds::{CloudOrder, CloudSetups, SetupOfCloud, find};
 pub use owned::Ownership;
 
 use crate::engine::{AllThreads, Engine};
@@ -22,8 +22,8 @@ pub(crate) struct OpenedInputs {
 }
 
 /// Opens the inputs of a job after those of an earlier result, with the positions that the job
-/// gives; where it gives none, with those that are found in the points. Where `looks` is given,
-/// inputs that it knows are not sampled again as the job states them.
+/// gives; where it gives none, with those that are found in the points of clouds of this order.
+/// Where `looks` is given, inputs that it knows are not sampled again as the job states them.
 ///
 /// # Errors
 /// As [`ingest::open`].
@@ -31,6 +31,7 @@ pub(crate) fn open(
     job: &Job,
     before: Before,
     looks: Option<&dyn KeepLooks>,
+    order: CloudOrder,
     engine: &Engine,
 ) -> Result<OpenedInputs> {
     let settings = &job.means.settings.ingest;
@@ -48,7 +49,7 @@ pub(crate) fn open(
         })?,
     };
     let is_wanted = given.is_none() && job.find_scanners;
-    let clouds = if is_wanted { find(&sources, engine)? } else { Vec::new() };
+    let clouds = if is_wanted { find(&sources, order, engine)? } else { Vec::new() };
     let entries: Vec<_> = clouds.iter().flat_map(CloudSetups::entries).collect();
     if entries.is_empty() {
         let sources = with_causes(sources, &clouds);

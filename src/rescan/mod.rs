@@ -30,7 +30,7 @@ use crate::detect::search::PreparedLibrary;
 
 use crate::engine::Engine;
 use crate::job::{Job, Outcome, units};
-use crate::positions;
+use crate::positions::{self, CloudOrder};
 use crate::result::page;
 use crate::result::plant_state::PlantState;
 use crate::store::Store;
@@ -160,7 +160,8 @@ impl Rescan<'_> {
         let &Rescan { base, job, engine, .. } = self;
         let settings = &job.means.settings;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
-        let sources = positions::open(job, base.state.before(), None, engine)?.sources;
+        let sources =
+            positions::open(job, base.state.before(), None, CloudOrder::Measured, engine)?.sources;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         Ok((library, sources))

@@ -8,7 +8,7 @@ use super::cases::{CaseToRun, Cases};
 use super::request::DrawnCases;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
-use crate::positions::{self, CloudSetups, Ownership};
+use crate::positions::{self, CloudOrder, CloudSetups, Ownership};
 use cloud::{DrawnCloud, Order};
 use contract::{Error, Result};
 use row::{FoundScanners, ScannersRow};
@@ -74,8 +74,9 @@ fn hall(
         let job = Job::new(vec![path.clone()], nowhere.clone(), nowhere, means.clone());
         let started = Instant::now();
         let job = Job { find_scanners: false, ..job };
-        let opened = positions::open(&job, ingest::Before::default(), None, engine)?;
-        let found = positions::find(&opened.sources, engine)?;
+        let opened =
+            positions::open(&job, ingest::Before::default(), None, CloudOrder::Measured, engine)?;
+        let found = positions::find(&opened.sources, CloudOrder::Any, engine)?;
         let seconds = started.elapsed().as_secs_f64();
         row.orders.push(compared(&cloud, order, &found, seconds));
         let _ = std::fs::remove_file(path);
