@@ -174,20 +174,20 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
+    /// A stage after nine seconds, with 17 of 60 pieces.
+    fn begun([done, total]: &[Amount; 2]) -> StageState<'_> {
+        let (seconds, cpu_seconds, is_over) = (9.0, 9.0, false);
+        StageState { done, total, pieces: [17, 60], seconds, cpu_seconds, is_over }
+    }
+
     #[test]
     fn rate_and_time_to_go() {
         let (done, total) = (Amount::points(25), Amount::points(100));
         assert_eq!(eta(&done, &total, 10.0), Some(30.0));
         assert_eq!(eta(&Amount::default(), &total, 10.0), None);
         assert_eq!(short(35_200_000.0), "35.2 M");
-        let fit = StageState {
-            done: &Amount::items(1),
-            total: &Amount::items(4),
-            pieces: [17, 60],
-            seconds: 9.0,
-            cpu_seconds: 9.0,
-            is_over: false,
-        };
+        let amounts = [Amount::items(1), Amount::items(4)];
+        let fit = begun(&amounts);
         assert_eq!(words(&fit), "25 %, 1 item, 17 of 60 pieces known so far, 27 s to go");
         let over = StageState { pieces: [60, 60], is_over: true, ..fit };
         assert_eq!(words(&over), "25 %, 1 item, done in 9.0 s");
@@ -195,14 +195,8 @@ mod tests {
 
     #[test]
     fn the_bar_shows_the_whole_run_and_says_first_how_long_it_goes_on() {
-        let state = StageState {
-            done: &Amount::items(1),
-            total: &Amount::items(4),
-            pieces: [17, 60],
-            seconds: 9.0,
-            cpu_seconds: 9.0,
-            is_over: false,
-        };
+        let amounts = [Amount::items(1), Amount::items(4)];
+        let state = begun(&amounts);
         let whole = Whole { share: 0.5, to_go: 130.0 };
         assert_eq!(
             bar_line("fit", &state, Some(whole), 128.0),
