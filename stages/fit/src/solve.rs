@@ -293,6 +293,7 @@ fn best_of(
     others: &mut Vec<Refined>,
 ) -> Settled {
     let (fan, steps) = (problem.fan, &search.steps);
+    let first = best.adjusted.hypothesis.clone();
     let mut best = best;
     let mut rivals = close_rivals(problem, steps, others, &best);
     for _ in 0..N_WRIST_ROUNDS {
@@ -311,7 +312,16 @@ fn best_of(
         }
         rivals = Vec::new();
     }
-    best
+    if is_same_arm(steps, &first, &best.adjusted.hypothesis) {
+        return best;
+    }
+    // The others were found beside the first wrist and have that: a base that stands a quarter turn
+    // off under the right wrist is not among them.
+    let more = search.alternatives(&best.adjusted.hypothesis);
+    let more = fan.fan(more, |h| polish(problem, &h));
+    let rivals = close_rivals(problem, steps, &more, &best);
+    others.extend(more);
+    better_of(problem, best, rivals, others)
 }
 
 /// Whether two postures agree in all joints but the last.

@@ -26,6 +26,9 @@ pub(super) struct OpenJoints {
     /// How far away the farthest of its other values is, or how wide a run of values that are all
     /// as good spreads, radians or metres.
     pub(super) spread: Vec<f64>,
+    /// How far away the base stands in the farthest of the postures that explain the points as
+    /// well: shift, metres, and turn, radians, along and about the world's axes.
+    base: [f64; 6],
 }
 
 impl OpenJoints {
@@ -42,6 +45,7 @@ impl OpenJoints {
         let mut is_open: Vec<bool> =
             (0..n).map(|j| covariance[(6 + j, 6 + j)] >= OPEN_SIGMA.powi(2)).collect();
         let mut spread = vec![0.0_f64; n];
+        let mut base = [0.0_f64; 6];
         for rival in rivals {
             let other = &rival.other.hypothesis;
             let apart: Vec<bool> = (0..n).map(|j| h.turn(other, j) > MODES.other_turn).collect();
@@ -56,15 +60,23 @@ impl OpenJoints {
                     is_open[j] = true;
                     spread[j] = spread[j].max(h.turn(other, j));
                 }
+                let apart = base_apart(h, other);
+                base = std::array::from_fn(|i| base[i].max(apart[i]));
             }
         }
-        Self { is_open, spread }
+        Self { is_open, spread, base }
+    }
+
+    /// Standard deviations of the base, where they are those of one of several places.
+    pub(super) fn base_sigma(&self, sigma: [f64; 6]) -> [f64; 6] {
+        let most = |i: usize| if i < 3 { f64::INFINITY } else { MODES.any_angle };
+        std::array::from_fn(|i| sigma[i].max(self.base[i]).min(most(i)))
     }
 
     /// Joints that may stand at several values are open; how far away the farthest value is, and
     /// how wide a run of values, all as good, spread, radians or metres.
     pub(super) fn add_leaves(&mut self, h: &Hypothesis, leaves: &[JointModes]) {
-        let Self { is_open, spread } = self;
+        let Self { is_open, spread, .. } = self;
         for s in leaves {
             // Any value of the run, each as likely.
             spread[s.joint] = spread[s.joint].max(s.extent / 3.0_f64.sqrt());
@@ -76,6 +88,18 @@ impl OpenJoints {
                 s.values.iter().map(|v| angle::apart(value, *v)).fold(spread[s.joint], f64::max);
         }
     }
+}
+
+/// How far apart the bases of two postures stand: shift, metres, and turn, radians, along and about
+/// the world's axes; nothing where they differ by no more than a refinement does.
+fn base_apart(h: &Hypothesis, other: &Hypothesis) -> [f64; 6] {
+    let (a, b) = (&h.local_from_base, &other.local_from_base);
+    let shift = b.translation.vector - a.translation.vector;
+    let turn = (b.rotation * a.rotation.inverse()).scaled_axis();
+    if turn.norm() <= MODES.other_turn {
+        return [0.0; 6];
+    }
+    [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z].map(f64::abs)
 }
 
 /// The joints as they are reported; of each, whether it is open, and how far away the farthest of
@@ -181,4 +205,41 @@ fn whole_turns(model: &Model, posture: &[f64], joint: usize) -> (f64, Vec<f64>) 
     }
     let nearest = all.remove(0);
     (nearest, all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::{judged, with_jaw};
+    use crate::refine::Refined;
+    use geometry::{Pose, Vector};
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn a_base_that_may_stand_a_quarter_turn_off_is_known_no_better_than_that() {
+        with_jaw(|problem, state| {
+            let h = &state.hypothesis;
+            let about = |base: Pose, turn: f64| {
+                let hypothesis =
+                    Hypothesis { local_from_base: base, posture: vec![turn, 0.0], ..h.clone() };
+                let judgement = judged(problem, &hypothesis);
+                Refined { hypothesis, judgement }
+            };
+            let sure = DMatrix::from_diagonal_element(8, 8, 1e-8);
+            let base_sigma = |other: &Refined, margin: f64| {
+                let rivals = [Rival { margin, other }];
+                let open = OpenJoints::of(problem, &sure, h, &rivals);
+                (open.is_open[0], open.base_sigma([1e-4; 6]))
+            };
+            // The plate stands where it stood: the joint is turned back.
+            let quarter = about(Pose::rotation(Vector::x() * FRAC_PI_2), -FRAC_PI_2);
+            let (is_open, sigma) = base_sigma(&quarter, 0.0);
+            assert!(is_open && (sigma[3] - FRAC_PI_2).abs() < 1e-9, "{sigma:?}");
+            assert_eq!([sigma[0], sigma[4], sigma[5]], [1e-4; 3]);
+            assert_eq!(base_sigma(&quarter, 0.5), (false, [1e-4; 6]));
+            // A flange that may stand otherwise says nothing of the base.
+            let flange = about(Pose::identity(), 1.0);
+            assert_eq!(base_sigma(&flange, 0.0), (true, [1e-4; 6]));
+        });
+    }
 }

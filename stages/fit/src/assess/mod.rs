@@ -57,7 +57,7 @@ pub(crate) fn report(problem: &Problem<'_>, answer: &PostureModes) -> Fit {
         model: prepared.index,
         model_name: model.name.clone(),
         world_from_base: problem.scene.world_from_local() * h.local_from_base,
-        base_sigma: std::array::from_fn(|i| sigma_of(&covariance, i)),
+        base_sigma: open.base_sigma(std::array::from_fn(|i| sigma_of(&covariance, i))),
         joints: joints(problem, h, &covariance, &open, &rivals),
         covariance: (0..n * n).map(|i| covariance[(i / n, i % n)]).collect(),
         score: judgement.score,
