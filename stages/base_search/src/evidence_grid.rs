@@ -24,6 +24,10 @@ pub(crate) const RUNG: f32 = 1.1;
 const N_RUNGS: usize = 17;
 /// Unit of the distances in a cell, metres.
 const UNIT: f32 = 0.004;
+/// Cells around the region along x, y and z, on either side, that the grid of scores has as well:
+/// bodies at its border are looked up as those in its middle are. 0.6 m, half a base and its first
+/// link, and 0.3 m.
+const MARGIN: [usize; 3] = [20, 20, 10];
 /// In `distance`: no beam ended near. In `beyond`: beams went there and none returned.
 const NOTHING: u8 = 255;
 
@@ -112,17 +116,33 @@ impl EvidenceGrid {
         let rung = rung.min(N_RUNGS - 1);
         let tolerance = least * RUNG.powi(rung as i32);
         let scores = self.scores[rung].get_or_init(|| self.score(tolerance));
-        Some(ScoreGrid { min: self.min, edge: self.edge, n: self.n.map(|n| n as i32), scores })
+        let min = std::array::from_fn(|i| self.min[i] - MARGIN[i] as f32 * self.edge);
+        let n = self.wide().map(|n| n as i32);
+        Some(ScoreGrid { min, edge: self.edge, n, scores })
     }
 
-    /// The scores of all cells at a tolerance.
+    /// Number of cells of the grid with its margin.
+    fn wide(&self) -> [usize; 3] {
+        std::array::from_fn(|i| self.n[i] + 2 * MARGIN[i])
+    }
+
+    /// The scores of all cells at a tolerance, with the margin, of which beams say nothing.
     fn score(&self, tolerance: f32) -> Vec<i8> {
         let of = |at: usize| {
             EvidenceCell { beyond: (at >> 8) as u8, distance: at as u8 }.score(tolerance)
         };
         let all: Vec<i8> = (0..1 << 16).map(of).collect();
         let score = |c: &EvidenceCell| all[usize::from(c.beyond) << 8 | usize::from(c.distance)];
-        self.cells.iter().map(score).collect()
+        let wide = self.wide();
+        let mut scores = vec![UNJUDGED; wide.iter().product()];
+        for (row, cells) in self.cells.chunks(self.n[0]).enumerate() {
+            let (j, k) = (row % self.n[1] + MARGIN[1], row / self.n[1] + MARGIN[2]);
+            let first = (k * wide[1] + j) * wide[0] + MARGIN[0];
+            for (to, cell) in scores[first..].iter_mut().zip(cells) {
+                *to = score(cell);
+            }
+        }
+        scores
     }
 }
 
