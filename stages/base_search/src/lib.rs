@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 mod body_boxes;
+mod coarse_level;
 mod evidence_grid;
 mod first_link;
 mod first_link_score;

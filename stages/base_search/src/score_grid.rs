@@ -4,6 +4,7 @@
 use crate::trial::{HIDDEN, SampleScore};
 use geometry::Pose;
 use geometry::depth::{LANES, Lanes, Rows, lanes, rows, transform, transform_lanes};
+use std::sync::OnceLock;
 
 /// Unit of the scores in a grid. The price of a hidden sample is two units, that of a sample that a
 /// beam passed through is a hundred.
@@ -21,7 +22,34 @@ pub(crate) struct ScoreGrid<'a> {
     pub(crate) n: [i32; 3],
     /// Score of each cell, in [`SCORE_UNIT`]s.
     pub(crate) scores: &'a [i8],
+    /// The same scores with every second cell, and with every third, side by side.
+    pub(crate) strided: &'a StridedScores,
 }
+
+/// For strides of two and three cells: the scores of every such cell from the first on, then from
+/// the second on, and so on; made when first requested.
+pub(crate) type StridedScores = [OnceLock<Vec<i8>>; 2];
+
+/// Places along x that a body is shifted to, at equal distances.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShiftRow {
+    /// Shift to the first of them, cells.
+    pub(crate) first: [i32; 3],
+    /// Distance of neighbours, cells: 1 to [`MAX_STRIDE`].
+    pub(crate) stride: i32,
+    pub(crate) n: usize,
+}
+
+impl ShiftRow {
+    /// Some of its places.
+    pub(crate) fn part(&self, at: usize, n: usize) -> Self {
+        let [x, y, z] = self.first;
+        Self { first: [x + self.stride * at as i32, y, z], stride: self.stride, n }
+    }
+}
+
+/// Largest distance of the places of a row, cells.
+pub(crate) const MAX_STRIDE: i32 = 3;
 
 /// Samples of a body at one orientation, as cells of the grid, so that the body can be shifted by
 /// whole cells.
@@ -89,6 +117,23 @@ impl<'a> ScoreGrid<'a> {
         }
     }
 
+    /// The scores in which cells at such a distance lie side by side, part after part.
+    fn with_stride(&self, stride: i32) -> &'a [i8] {
+        if stride <= 1 {
+            return self.scores;
+        }
+        self.strided[stride as usize - 2].get_or_init(|| {
+            let stride = stride as usize;
+            let part = self.scores.len().div_ceil(stride);
+            let mut out = vec![UNJUDGED; part * stride];
+            for (first, part) in out.chunks_mut(part).enumerate() {
+                let every = self.scores[first..].iter().step_by(stride);
+                part.iter_mut().zip(every).for_each(|(to, score)| *to = *score);
+            }
+            out
+        })
+    }
+
     /// Index of a cell, or the difference of index to a cell this many cells away.
     fn place(&self, at: [i32; 3]) -> i32 {
         (at[2] * self.n[1] + at[1]) * self.n[0] + at[0]
@@ -96,14 +141,47 @@ impl<'a> ScoreGrid<'a> {
 }
 
 impl Stencil<'_> {
+    /// The shift (region frame, metres), rounded to whole cells.
+    pub(crate) fn cells(&self, shift: [f32; 3]) -> [i32; 3] {
+        shift.map(|v| (v / self.grid.edge).round() as i32)
+    }
+
+    /// Whether all samples stay in the grid, shifted by so many cells.
+    fn is_inside(&self, by: [i32; 3]) -> bool {
+        (0..3).all(|i| by[i] + self.low[i] >= 0 && by[i] + self.high[i] < self.grid.n[i])
+    }
+
+    /// Scores of the first `n` samples at each place of a row; `None` if a sample would lie outside
+    /// of the grid. Sample by sample, since the cells of neighbouring places lie side by side.
+    pub(crate) fn look_up_row(&self, row: &ShiftRow, n: usize) -> Option<Vec<SampleScore>> {
+        let last = row.first[0] + row.stride * (row.n as i32 - 1);
+        let ends = [row.first, [last, row.first[1], row.first[2]]];
+        if !ends.into_iter().all(|by| self.is_inside(by)) {
+            return None;
+        }
+        let (scores, stride) = (self.grid.with_stride(row.stride), row.stride as usize);
+        let part = self.grid.scores.len().div_ceil(stride);
+        let places = &self.places[..n.min(self.places.len())];
+        let step = self.grid.place(row.first);
+        let (mut sums, mut n_seen) = (vec![0_i16; row.n], vec![0_i16; row.n]);
+        for place in places {
+            let at = (place + step) as usize;
+            let along = &scores[at % stride * part + at / stride..][..row.n];
+            for ((sum, n_seen), score) in sums.iter_mut().zip(&mut n_seen).zip(along) {
+                *sum += i16::from(*score);
+                *n_seen += i16::from(*score != UNJUDGED);
+            }
+        }
+        let each = sums.into_iter().zip(n_seen);
+        Some(each.map(|(sum, seen)| rated(sum.into(), seen.into(), places.len())).collect())
+    }
+
     /// Score of the first `n` samples with the body shifted by `shift` (region frame, metres),
     /// rounded to whole cells; `None` if a sample would lie outside of the grid.
     pub(crate) fn look_up(&self, shift: [f32; 3], n: usize) -> Option<SampleScore> {
         let grid = &self.grid;
-        let by = shift.map(|v| (v / grid.edge).round() as i32);
-        let is_inside =
-            (0..3).all(|i| by[i] + self.low[i] >= 0 && by[i] + self.high[i] < grid.n[i]);
-        is_inside.then(|| {
+        let by = self.cells(shift);
+        self.is_inside(by).then(|| {
             let step = grid.place(by);
             let places = &self.places[..n.min(self.places.len())];
             rating(places.iter().map(|p| grid.scores[(p + step) as usize]), places.len())
@@ -116,6 +194,11 @@ fn rating(scores: impl Iterator<Item = i8>, n: usize) -> SampleScore {
         (sum + i32::from(score), n_seen + i32::from(score != UNJUDGED))
     };
     let (sum, n_seen) = scores.fold((0, 0), add);
+    rated(sum, n_seen, n)
+}
+
+/// The score of `n` samples by their sum, in [`SCORE_UNIT`]s, and by how many of them were judged.
+fn rated(sum: i32, n_seen: i32, n: usize) -> SampleScore {
     let n = n.max(1) as f64;
     SampleScore { score: f64::from(sum) * f64::from(SCORE_UNIT) / n, seen: f64::from(n_seen) / n }
 }
@@ -128,7 +211,9 @@ mod tests {
     fn a_moved_body_scores_as_where_it_was_moved_to_and_nothing_outside() {
         let n = [20, 17, 13];
         let scores: Vec<i8> = (0..20 * 17 * 13).map(|i| (i * 37 % 150 - 100) as i8).collect();
-        let grid = ScoreGrid { min: [-0.3, 0.1, -0.2], edge: 0.03, n, scores: &scores };
+        let strided = StridedScores::default();
+        let strided = &strided;
+        let grid = ScoreGrid { min: [-0.3, 0.1, -0.2], edge: 0.03, n, scores: &scores, strided };
         let points = [[0.0, 0.02, 0.05], [0.07, -0.01, 0.1], [-0.05, 0.03, 0.0]];
         let at = |x: f64, y: f64, z: f64| Pose::translation(-0.1 + x, 0.2 + y, -0.1 + z);
         let stencil = grid.stencil(&points, &at(0.0, 0.0, 0.0));
@@ -138,6 +223,15 @@ mod tests {
             assert_eq!(stencil.look_up(by.map(|v| v as f32), 3), Some(moved), "{by:?}");
         }
         assert_eq!(stencil.look_up([1.0, 0.0, 0.0], 3), None);
+        for (stride, first, n) in [(1, [-2, 3, 1], 9), (2, [-3, -1, 0], 6), (3, [0, 2, -1], 3)] {
+            let row = ShiftRow { first, stride, n };
+            let by = |at: usize| [first[0] + stride * at as i32, first[1], first[2]];
+            let metres = |at: usize| by(at).map(|v| v as f32 * 0.03);
+            let each = (0..n).map(|at| stencil.look_up(metres(at), 3)).collect::<Option<Vec<_>>>();
+            assert!(each.is_some(), "{row:?}");
+            assert_eq!(stencil.look_up_row(&row, 3), each, "{row:?}");
+            assert_eq!(stencil.look_up_row(&ShiftRow { n: 20, ..row }, 3), None);
+        }
         let outside = grid.look_up(&points, &at(9.0, 0.0, 0.0)).score;
         assert!((outside + f64::from(HIDDEN)).abs() < 1e-6, "{outside}");
     }

@@ -6,7 +6,7 @@
 //! joint: many boxes have the shape of a base, but few that of a base with a carousel on it.
 
 use contract::{Candidate, Fan, InstallationPlane};
-use geometry::{Plane, Pose, Vector};
+use geometry::{Plane, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 
 use crate::first_link_score::PlausibleBases;
@@ -15,18 +15,8 @@ use crate::hill_climb::SearchLevel;
 use crate::outscored::CoarseBases;
 use crate::problem::BaseSearch;
 use crate::regions::{GUESS_STEP, are_stacked};
-use crate::score_grid::Stencil;
-use crate::trial::{BaseTrial, SampleScore, Samples, Thinning, best, coarse_yaw};
+use crate::trial::{BaseTrial, SampleScore, Thinning, best, coarse_yaw};
 
-/// Heights above a plane of the points that may belong to a base, metres: above the plane itself,
-/// and not above a robot's shoulder.
-const FOOT_HEIGHTS: std::ops::Range<f64> = 0.03..1.2;
-/// Share of the base's radius within which a place needs points around it.
-const SURROUND_SHARE: f64 = 0.8;
-/// Fewest filled cells of the plane within that radius.
-const MIN_CELLS: usize = 3;
-/// Fewest points of a filled cell.
-const MIN_IN_CELL: u32 = 3;
 /// Largest stride between guessed planes at the coarse level: the next levels try two planes up and
 /// down, and then one.
 const MAX_STRIDE: usize = 6;
@@ -145,7 +135,7 @@ impl BaseSearch<'_> {
     }
 
     /// Whether a pose of the coarsest grid is looked at more closely.
-    fn is_open(&self, rating: &SampleScore) -> bool {
+    pub(crate) fn is_open(&self, rating: &SampleScore) -> bool {
         rating.score > 0.0 && self.may_be_plausible(rating)
     }
 
@@ -169,12 +159,12 @@ impl BaseSearch<'_> {
     }
 
     /// Step of the coarse grid, metres: small enough that the true place lies within the tolerance.
-    fn coarse_step(&self) -> f64 {
+    pub(crate) fn coarse_step(&self) -> f64 {
         self.region.whole_cells((self.radius * 0.35).clamp(0.04, 0.10))
     }
 
     /// Tolerance of the coarse level, metres.
-    fn coarse_tolerance(&self) -> f32 {
+    pub(crate) fn coarse_tolerance(&self) -> f32 {
         self.region.grid_tolerance((COARSE_REACH * self.coarse_step()) as f32)
     }
 
@@ -192,118 +182,6 @@ impl BaseSearch<'_> {
             !self.is_guess || (*at - first).is_multiple_of(stride)
         };
         (0..planes.len()).filter(is_searched).collect()
-    }
-
-    /// Scores every place on the plane that has points around it, at every yaw.
-    fn coarse(
-        &self,
-        at: usize,
-        plane: &InstallationPlane,
-        local: &Plane,
-        fan: &dyn Fan,
-    ) -> Vec<BaseTrial> {
-        let (step, tolerance) = (self.coarse_step(), self.coarse_tolerance());
-        let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
-        let places = self.occupied(plane, local, step);
-        let Some(start) = places.first().copied() else { return Vec::new() };
-        let samples = Samples::first(self.model, self.base, self.settings.n_coarse);
-        let turned = |k: usize| {
-            self.pose(local, start.0, start.1, k as f64 * coarse_yaw()) * self.root_from_base
-        };
-        let stencils: Option<Vec<Stencil<'_>>> =
-            (0..n).map(|k| self.region.stencil(samples.points, &turned(k), tolerance)).collect();
-        let frame = local.frame();
-        let place = |(x, y): (f64, f64)| -> Vec<BaseTrial> {
-            let shift = frame * Vector::new(x - start.0, y - start.1, 0.0);
-            let look_up = |k: usize, n_samples: usize| {
-                let known = stencils.as_ref().map(|s| &s[k]);
-                let known = known.and_then(|s| s.look_up(shift.cast::<f32>().into(), n_samples));
-                known.unwrap_or_else(|| {
-                    let mut pose = turned(k);
-                    pose.translation.vector += shift;
-                    let samples = Samples::first(self.model, self.base, n_samples);
-                    self.quick_score(samples, &pose, tolerance)
-                })
-            };
-            // Few samples at every other yaw exclude most places, and most yaws of the others.
-            let few: Vec<f64> =
-                (0..n).step_by(2).map(|k| look_up(k, self.settings.n_coarse / 4).score).collect();
-            let top = few.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b));
-            if top < self.thrift.min_quick_score {
-                return Vec::new();
-            }
-            let is_near_top = |k: usize| {
-                few[k / 2 % few.len()].max(few[k.div_ceil(2) % few.len()])
-                    >= top - self.thrift.yaw_lag
-            };
-            let all = (0..n).filter(|k| is_near_top(*k)).filter_map(|k| {
-                let rating = look_up(k, self.settings.n_coarse);
-                let yaw = k as f64 * coarse_yaw();
-                let first = SampleScore::default();
-                self.is_open(&rating).then_some(BaseTrial { x, y, yaw, plane: at, rating, first })
-            });
-            all.collect()
-        };
-        fan.fan(places, place).into_iter().flatten().collect()
-    }
-
-    /// Places on the plane (x, y in its own coordinates, metres) that have points above it within
-    /// the base's radius, row by row.
-    fn occupied(&self, plane: &InstallationPlane, local: &Plane, step: f64) -> Vec<(f64, f64)> {
-        let to_plane = local.frame().inverse();
-        let span = |corners: [[f64; 3]; 8], i: usize| {
-            let along = corners.map(|c| (to_plane * Vector::from(c))[i]);
-            along
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)))
-        };
-        let shifted = plane.bounds.corners().map(|c| {
-            let at = Vector::from(c) - self.region.region.origin.coords;
-            [at.x, at.y, at.z]
-        });
-        let reach = self.region.region.bounds.corners();
-        let grow = self.radius.max(0.1);
-        let low: [f64; 2] =
-            std::array::from_fn(|i| span(reach, i).0.max(span(shifted, i).0 - grow));
-        let high: [f64; 2] =
-            std::array::from_fn(|i| span(reach, i).1.min(span(shifted, i).1 + grow));
-        if low[0] >= high[0] || low[1] >= high[1] {
-            return Vec::new();
-        }
-        let n: [usize; 2] =
-            std::array::from_fn(|i| ((high[i] - low[i]) / step).ceil() as usize + 1);
-        let mut count = vec![0_u32; n[0] * n[1]];
-        for cube in self.region.point_cubes() {
-            let q = to_plane * Vector::from(cube.at.map(f64::from));
-            let height = q.z - local.offset;
-            if !FOOT_HEIGHTS.contains(&height) {
-                continue;
-            }
-            let i = ((q.x - low[0]) / step).round();
-            let j = ((q.y - low[1]) / step).round();
-            if i >= 0.0 && j >= 0.0 && (i as usize) < n[0] && (j as usize) < n[1] {
-                count[j as usize * n[0] + i as usize] += cube.n_points;
-            }
-        }
-        // The scans show no points in the middle of a base, so that points around it are counted.
-        let r = ((self.radius * SURROUND_SHARE) / step).ceil() as isize;
-        let disc: Vec<(isize, isize)> = (-r..=r)
-            .flat_map(|dj| (-r..=r).map(move |di| (di, dj)))
-            .filter(|(di, dj)| di * di + dj * dj <= r * r)
-            .collect();
-        let mut near = vec![0_usize; count.len()];
-        for (at, _) in count.iter().enumerate().filter(|(_, n)| **n >= MIN_IN_CELL) {
-            let (i, j) = ((at % n[0]) as isize, (at / n[0]) as isize);
-            for (di, dj) in &disc {
-                let (a, b) = (i + di, j + dj);
-                if a >= 0 && b >= 0 && (a as usize) < n[0] && (b as usize) < n[1] {
-                    near[b as usize * n[0] + a as usize] += 1;
-                }
-            }
-        }
-        let place =
-            |at: usize| (low[0] + (at % n[0]) as f64 * step, low[1] + (at / n[0]) as f64 * step);
-        near.iter().enumerate().filter(|(_, n)| **n >= MIN_CELLS).map(|(at, _)| place(at)).collect()
     }
 
     /// Refines trials to the finest level in batches, best first. Ends where no other trial can
