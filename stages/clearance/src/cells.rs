@@ -28,7 +28,8 @@ pub struct Cells {
     pub(crate) eyes: Vec<ScannerAt>,
 }
 
-/// Cells around a robot whose points are no evidence of an object, see [`crate::Obstacles::strays`].
+/// Cells around a robot whose points are no evidence of an object, see
+/// [`crate::Obstacles::strays`].
 #[derive(Debug, Clone)]
 pub struct StrayCells {
     far: f64,

@@ -1,3 +1,5 @@
+//! Points of things and stray points, as one or two scanners have them: which are evidence.
+
 use super::*;
 use crate::cells::{CellSight, Cells};
 use crate::shadow::ScannerAt;
