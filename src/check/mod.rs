@@ -102,6 +102,11 @@ pub(crate) fn at_robot<T>(
 }
 
 impl RobotSite<'_> {
+    /// Everything around the robot.
+    pub(crate) fn obstacles(&self) -> &Obstacles {
+        &self.obstacles
+    }
+
     /// Checks one path of the robot.
     ///
     /// # Errors

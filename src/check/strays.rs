@@ -1,4 +1,4 @@
-//! Uncertain points of a result that are no obstacles for `check`: they are no evidence of an
+//! Points of a result that are no obstacles for `check`: they are no evidence of an
 //! object, or lie on a robot. What is made for planners leaves them out by the same rule.
 
 use super::subject::CheckedRobot;

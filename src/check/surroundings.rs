@@ -3,7 +3,7 @@
 use super::CheckedRobot;
 use crate::cache::{VerifiedFiles, tiles_of};
 use crate::detect::robots::poses;
-use crate::engine::{Engine, Task};
+use crate::engine::{AllThreads, Engine, Task};
 use crate::result::plant_state::PlantState;
 use clearance::{
     AttachedPoints, CELL, Cells, KnownBounds, ObstacleKind, Obstacles, ScannerAt, Shadow,
@@ -91,7 +91,8 @@ impl Surroundings<'_> {
         let space: Option<Space> = robot.entry.space.as_ref().map(read).transpose()?;
         let bounds = space.as_ref().map_or(Aabb::EMPTY, |space| space.grid().bounds());
         let known = KnownBounds { world_from_base: robot.fit.world_from_base, bounds };
-        Ok((hung, Obstacles::new(&cells, &others, space.as_ref(), known)))
+        let new = || Obstacles::new(&cells, &others, space.as_ref(), known, &AllThreads);
+        Ok((hung, engine.pool()?.install(new)))
     }
 
     /// Cells of all points that may be obstacles, and points attached to the robot.

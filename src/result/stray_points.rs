@@ -1,4 +1,4 @@
-//! Uncertain points of a result that are no obstacles to its robots, by the rule of `check`, which
+//! Points of a result that are no obstacles to its robots, by the rule of `check`, which
 //! finds them.
 
 use super::plant_state::PlantState;
@@ -30,18 +30,19 @@ pub(crate) struct RobotStrays {
 }
 
 impl StrayPoints {
-    /// Whether a point is uncertain and no obstacle to any robot that it is near to, and there is
-    /// such a robot; world frame, metres. Of points that are known to be fixed none is left out: a
-    /// part of a wall that few beams met behind the edge of a robot may look like strays.
+    /// Whether a point is fixed or uncertain and no obstacle to any robot that it is near to, and
+    /// there is such a robot; world frame, metres.
     pub(crate) fn contains(&self, world: [f64; 3], kind: PointKind) -> bool {
-        if kind != PointKind::Uncertain {
-            return false;
-        }
+        let what = match kind {
+            PointKind::Fixed => ObstacleKind::Fixed,
+            PointKind::Uncertain => ObstacleKind::Uncertain,
+            _ => return false,
+        };
         let mut is_stray = false;
         let near = self.0.iter().filter(|robot| robot.bounds.contains(world));
         for RobotStrays { base_from_world, cells, .. } in near {
             let p = base_from_world * Point::from(world);
-            match cells.contains(p.coords.into(), ObstacleKind::Uncertain) {
+            match cells.contains(p.coords.into(), what) {
                 Some(false) => return false,
                 Some(true) => is_stray = true,
                 None => {}

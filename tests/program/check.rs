@@ -131,4 +131,14 @@ fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
     assert!(free.len() >= 5 && hits.len() >= 3, "{row}");
     assert!(hits.iter().all(|p| p["outcome"] != "free"), "{hits:?}");
     assert!(free.iter().all(|p| p["outcome"] == "free"), "{free:?}");
+
+    // Of points of still things hardly any are dropped, of strays behind edges many.
+    let points = row["points"].as_object().expect("counts");
+    let sum = |strays: bool, what: &str| -> u64 {
+        let own = points.iter().filter(|(name, _)| (*name == "strays") == strays);
+        own.map(|(_, count)| count[what].as_u64().expect("a number")).sum()
+    };
+    assert!(sum(false, "n") > 20_000 && sum(true, "n") > 50, "{points:?}");
+    assert!(1000 * sum(false, "n_dropped") < sum(false, "n"), "{points:?}");
+    assert!(5 * sum(true, "n_dropped") > 2 * sum(true, "n"), "{points:?}");
 }

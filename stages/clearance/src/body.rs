@@ -2,7 +2,7 @@
 //! posture.
 
 use crate::contact_level::ContactLevel;
-use crate::evidence::{supported_by_others, surface_threshold};
+use crate::evidence::{supported_by_others, surface_threshold_of};
 use crate::obstacle::{HALF_CELL, Obstacle, ObstacleKind};
 use crate::obstacles::{Bin, Obstacles, Replaced};
 use crate::pockets::remove_pockets;
@@ -292,7 +292,7 @@ fn strays(
         (0..out.len()).filter(|&at| around.all[at].is_point() && !out[at]).collect();
     let all: Vec<Obstacle> = others.iter().map(|&at| around.all[at]).collect();
     let is_evident =
-        supported_by_others(&all, surface_threshold(&points), |k| near[others[k]].is_some());
+        supported_by_others(&all, surface_threshold_of(&points), |k| near[others[k]].is_some());
     for (at, is_evident) in others.into_iter().zip(is_evident) {
         out[at] = near[at].is_some() && !is_evident;
     }

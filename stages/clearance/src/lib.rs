@@ -24,7 +24,7 @@
 //! cells.remove_duplicates();
 //! let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
 //! let known = KnownBounds { world_from_base: Pose::identity(), bounds };
-//! let mut around = Obstacles::new(&cells, &[], None, known);
+//! let mut around = Obstacles::new(&cells, &[], None, known, &contract::OneByOne);
 //! let mut body = RobotBody::new(&model, Default::default(), margin, 0.0, &contract::OneByOne);
 //! body.remove_robot(&found, &mut around);
 //! let path = [found.clone(), vec![2.0]]; // the beam turns past a post at 90°
@@ -38,8 +38,12 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod cells;
 mod contact_level;
 mod evidence;
+mod front;
+mod grid;
+mod lines;
 mod obstacle;
 mod obstacles;
 mod path;
@@ -48,9 +52,10 @@ mod shadow;
 mod shape;
 
 pub use body::{AttachedPoints, RobotBody, STEP, reach};
+pub use cells::{Cells, FARTHEST, PointCell, StrayCells};
 pub use contact_level::ContactLevel;
 pub use evidence::attached_points;
 pub use obstacle::{CELL, ObstacleKind};
-pub use obstacles::{Cells, FARTHEST, KnownBounds, Obstacles, StrayCells};
+pub use obstacles::{KnownBounds, Obstacles};
 pub use path::{Contact, Contacts, Leg, PathWalk, PieceContacts, leg};
 pub use shadow::{ScannerAt, Shadow};

@@ -1,22 +1,19 @@
 //! Obstacles around a robot: balls that contain the points of a cell, sorted into bins. All
 //! coordinates are in the frame of the robot's base, metres.
 
-use crate::evidence::evident;
-use crate::obstacle::{CELL, HALF_CELL, HALF_DIAGONAL, Obstacle, ObstacleKind, distance};
-use crate::shadow::{Front, ScannerAt};
-use contract::{Space, SpaceKind};
+use crate::cells::{CellSight, Cells, PointCell, StrayCells, key, middle};
+use crate::evidence::{SeenSpace, evident};
+use crate::obstacle::{HALF_DIAGONAL, Obstacle, ObstacleKind, distance};
+use crate::shadow::ScannerAt;
+use contract::{Fan, Space, SpaceKind};
 use geometry::{Aabb, Point, Pose, Vector};
 use robot::Model;
 use rustc_hash::FxHashMap;
-use std::collections::BTreeMap;
 use std::ops::Range;
+
 /// Edge of a bin, metres: a bin has about as many cells of a surface as there are bins about a
 /// robot.
 const BIN: f64 = 0.16;
-/// Number of bits of a cell's position along each axis.
-const BITS: u32 = 20;
-/// Largest distance from a base at which the cells of points are distinct, metres: 2 km.
-pub const FARTHEST: f64 = 0.5 * CELL * (1_u32 << BITS) as f64;
 
 /// Neighbouring obstacles.
 #[derive(Debug, Clone)]
@@ -25,20 +22,6 @@ pub(crate) struct Bin {
     /// Radius of the ball about the centre that contains all of them, metres.
     pub(crate) radius: f32,
     pub(crate) range: Range<usize>,
-}
-
-/// Cells that hold points, once for each kind of obstacle.
-#[derive(Debug, Clone, Default)]
-pub struct Cells {
-    /// Largest distance from the base along each axis, metres.
-    far: f64,
-    /// Position, kind, whether the beam grazed the edge of a robot, and `point_source_id` of the
-    /// scanner.
-    cells: Vec<(u64, ObstacleKind, bool, u16)>,
-    /// Nearest measurements of each scanner, whatever they belong to, by `point_source_id`.
-    fronts: BTreeMap<u16, Front>,
-    /// These scanners.
-    eyes: Vec<ScannerAt>,
 }
 
 /// The part of space that beams passed through, in the world frame.
@@ -73,37 +56,6 @@ pub struct Obstacles {
     strays: Vec<(u64, ObstacleKind)>,
 }
 
-/// Cells around a robot whose points are no evidence of an object, see [`Obstacles::strays`].
-#[derive(Debug, Clone)]
-pub struct StrayCells {
-    far: f64,
-    /// Ascending.
-    cells: Vec<(u64, ObstacleKind)>,
-}
-
-impl StrayCells {
-    /// Whether a point (base frame, metres) of this kind is no evidence of an object; `None` beyond
-    /// the distance up to which points were looked at.
-    #[must_use]
-    pub fn contains(&self, p: [f64; 3], what: ObstacleKind) -> Option<bool> {
-        let is_inside = p.iter().all(|v| v.abs() <= self.far);
-        is_inside.then(|| self.cells.binary_search(&(cell(p, self.far), what)).is_ok())
-    }
-
-    /// Where points were looked at; base frame, metres.
-    #[must_use]
-    pub fn bounds(&self) -> Aabb {
-        Aabb { min: [-self.far; 3], max: [self.far; 3] }
-    }
-}
-
-/// Key of the cell of a place in the base's frame, at most `far` metres away along each axis.
-fn cell(p: [f64; 3], far: f64) -> u64 {
-    let most = f64::from((1_u32 << BITS) - 1);
-    let place = |i: usize| ((p[i] + far) / CELL).clamp(0.0, most) as u64;
-    place(0) << (2 * BITS) | place(1) << BITS | place(2)
-}
-
 /// How a voxel of unseen space is divided into parts.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Split {
@@ -115,106 +67,6 @@ pub(crate) struct Split {
     edge: f64,
 }
 
-impl Cells {
-    /// Empty cells for points up to `far` metres from the base along each axis. `eyes` are the
-    /// scanners with known position, by the `point_source_id` of their points.
-    #[must_use]
-    pub fn within(far: f64, eyes: &BTreeMap<u16, ScannerAt>) -> Self {
-        let fronts = eyes.iter().map(|(source, eye)| (*source, Front::new(eye))).collect();
-        Self { far, cells: Vec::new(), fronts, eyes: eyes.values().copied().collect() }
-    }
-
-    /// Records that a scanner measured a point (base frame, at most `far` away), whatever it is.
-    pub fn add_measurement(&mut self, p: &Point, source: u16) {
-        if let Some(front) = self.fronts.get_mut(&source) {
-            front.add(p);
-        }
-    }
-
-    /// Adds a point (base frame, at most `far` away) with whether its beam grazed the edge of a
-    /// robot, and the `point_source_id` of its scanner.
-    pub fn add(&mut self, p: [f64; 3], what: ObstacleKind, is_grazed: bool, source: u16) {
-        self.cells.push((cell(p, self.far), what, is_grazed, source));
-    }
-
-    /// Removes duplicate cells. Call it after each tile, so that only distinct cells take memory.
-    pub fn remove_duplicates(&mut self) {
-        self.cells.sort_unstable();
-        self.cells.dedup();
-    }
-
-    /// Adds the cells of another part of the same surroundings. Call [`Cells::remove_duplicates`]
-    /// at the end.
-    pub fn join(&mut self, other: Self) {
-        self.cells.extend(other.cells);
-        for (source, front) in other.fronts {
-            if let Some(own) = self.fronts.get_mut(&source) {
-                own.join(front);
-            }
-        }
-    }
-
-    /// For each of the obstacles, where its cells are.
-    fn sources(&self) -> Vec<Range<usize>> {
-        let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
-        let mut from = 0;
-        let next = |alike: &[_]| {
-            let own = from..from + alike.len();
-            from = own.end;
-            own
-        };
-        alike.map(next).collect()
-    }
-
-    /// Places of the scanners that measured some cells; of all scanners, if one is not known.
-    fn eyes_of(&self, cells: &Range<usize>) -> Vec<Point> {
-        let eye = |source: u16| {
-            let known = self.fronts.keys().zip(&self.eyes).find(|(own, _)| **own == source);
-            known.map(|(_, eye)| eye.at)
-        };
-        let all = || self.eyes.iter().map(|eye| eye.at).collect();
-        let cells = self.cells[cells.clone()].iter();
-        cells.map(|cell| eye(cell.3)).collect::<Option<Vec<Point>>>().unwrap_or_else(all)
-    }
-
-    /// One obstacle for each cell and kind.
-    fn obstacles(&self) -> Vec<Obstacle> {
-        let mask = (1_u64 << BITS) - 1;
-        let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
-        let obstacle = |alike: &[(u64, ObstacleKind, bool, u16)]| {
-            let (key, what, ..) = alike[0];
-            let is_grazed = alike.iter().all(|cell| cell.2);
-            let cell = [key >> (2 * BITS), key >> BITS & mask, key & mask];
-            let at = |i: usize| ((cell[i] as f64 + 0.5) * CELL - self.far) as f32;
-            Obstacle { at: [at(0), at(1), at(2)], radius: HALF_CELL, what, is_grazed }
-        };
-        alike.map(obstacle).collect()
-    }
-}
-
-impl Cells {
-    /// For each thin obstacle, whether its beam passed the edge of something in front of it,
-    /// according to all scanners that measured it: neighbouring beams hit something, or another
-    /// scanner measured something there. Of a wire in front of a surface a scanner may have
-    /// nothing but points in between. `false` for all others.
-    fn behind(&self, all: &[Obstacle], thin: &[bool]) -> Vec<bool> {
-        let place = |o: &Obstacle| Point::from(o.at.map(f64::from));
-        let mut fronts = self.fronts.clone();
-        for front in fronts.values_mut() {
-            let asked = all.iter().zip(thin).filter(|(_, thin)| **thin).map(|(o, _)| place(o));
-            front.add_beside(asked, all.iter().filter(|o| o.is_point()).map(place));
-        }
-        let alike = self.cells.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1));
-        let is_behind = |(at, alike): (usize, &[(u64, ObstacleKind, bool, u16)])| {
-            let p = place(&all[at]);
-            let by = |source: u16| fronts.get(&source).is_some_and(|f| f.is_behind(&p));
-            // Beams that grazed a robot are no evidence.
-            thin[at] && alike.iter().filter(|cell| !cell.2).all(|cell| by(cell.3))
-        };
-        alike.enumerate().map(is_behind).collect()
-    }
-}
-
 impl Obstacles {
     /// The obstacles from the cells, from other robots (index, model, poses of their links in this
     /// robot's base frame), and from unseen space, as far as space is known.
@@ -224,18 +76,17 @@ impl Obstacles {
         others: &[(i16, &Model, Vec<Pose>)],
         space: Option<&Space>,
         known: KnownBounds,
+        fan: &dyn Fan,
     ) -> Self {
         let mut all: Vec<Obstacle> = cells.obstacles();
-        let behind = |all: &[Obstacle], thin: &[bool]| cells.behind(all, thin);
-        let sources = cells.sources();
-        let eyes = |at: usize| cells.eyes_of(&sources[at]);
-        let is_evident = evident(&mut all, behind, eyes, space, &known.world_from_base);
+        let seen = space.map(|space| SeenSpace { space, world_from_base: &known.world_from_base });
+        let is_evident = evident(&mut all, &CellSight::new(cells), seen, fan);
         let mut evident = is_evident.into_iter();
         let mut strays = Vec::new();
         all.retain(|o| {
             let is_evident = evident.next().unwrap_or(true);
             if !is_evident {
-                strays.push((cell(o.at.map(f64::from), cells.far), o.what));
+                strays.push((key(o.at.map(f64::from), cells.far), o.what));
             }
             is_evident
         });
@@ -284,7 +135,7 @@ impl Obstacles {
                 Replaced::Kept => all.push(*o),
                 Replaced::By(others) => {
                     if others.is_empty() && o.is_point() {
-                        self.strays.push((cell(o.at.map(f64::from), self.far), o.what));
+                        self.strays.push((key(o.at.map(f64::from), self.far), o.what));
                     }
                     all.extend(others);
                 }
@@ -297,10 +148,22 @@ impl Obstacles {
     /// Cells of points that are no obstacles, since they are no evidence of an object.
     #[must_use]
     pub fn strays(&self) -> StrayCells {
-        let mut cells = self.strays.clone();
-        cells.sort_unstable();
-        cells.dedup();
-        StrayCells { far: self.far, cells }
+        StrayCells::new(self.far, self.strays.clone())
+    }
+
+    /// All cells of points that stand still or may do so, whether obstacles or dropped.
+    pub fn point_cells(&self) -> impl Iterator<Item = PointCell> + '_ {
+        let is_point = |o: &&Obstacle| o.is_point() || o.what == ObstacleKind::Beside;
+        let kept = self.all.iter().filter(is_point);
+        let dropped = self.strays.iter().map(|(key, what)| (middle(*key, self.far), *what));
+        (kept.map(|o| PointCell { at: o.at, what: o.what, is_dropped: false }))
+            .chain(dropped.map(|(at, what)| PointCell { at, what, is_dropped: true }))
+    }
+
+    /// Pose of the robot's base in the world, metres.
+    #[must_use]
+    pub fn world_from_base(&self) -> Pose {
+        self.known.world_from_base
     }
 
     /// Radius of the largest obstacle, metres.

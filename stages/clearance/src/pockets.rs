@@ -131,7 +131,8 @@ impl<'a> Neighbours<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::obstacles::{Cells, KnownBounds};
+    use crate::cells::Cells;
+    use crate::obstacles::KnownBounds;
     use contract::{Space, SpaceGrid, SpaceKind};
     use geometry::{Aabb, Pose};
 
@@ -151,7 +152,7 @@ mod tests {
         let mut cells = Cells::within(1.5, &Default::default());
         points.iter().for_each(|p| cells.add(*p, ObstacleKind::Floor, false, 0));
         let known = KnownBounds { world_from_base: Pose::identity(), bounds };
-        let mut around = Obstacles::new(&cells, &[], Some(&space), known);
+        let mut around = Obstacles::new(&cells, &[], Some(&space), known, &contract::OneByOne);
         let split = around.split.clone();
         around.replace(|_, o| {
             let parts = split.parts(o).filter(|_| is_divided);

@@ -6,7 +6,7 @@
 
 use geometry::{Point, Pose};
 use robot::Model;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 /// A beam may hit a surface that it passes at this distance or less, metres: the radius of a beam,
 /// and the errors of posture and model.
@@ -103,72 +103,6 @@ pub struct ScannerAt {
     pub step: f64,
 }
 
-/// The nearest measurement of a scanner in each direction.
-#[derive(Debug, Clone)]
-pub(crate) struct Front {
-    eye: Point,
-    width: f64,
-    near: FxHashMap<[i32; 3], f32>,
-}
-
-/// Smallest width of a beam, radians: 3 mm at 3 m.
-const BEAM: f64 = 1e-3;
-/// A point that is nearer by less belongs to the same object, metres: noise, and surfaces seen at
-/// an angle.
-const MIN_DEPTH: f32 = 0.02;
-
-impl Front {
-    pub(crate) fn new(eye: &ScannerAt) -> Self {
-        Self { eye: eye.at, width: eye.step.max(BEAM), near: FxHashMap::default() }
-    }
-
-    pub(crate) fn add(&mut self, p: &Point) {
-        let (cell, far) = self.cell(p);
-        let near = self.near.entry(cell).or_insert(far);
-        *near = near.min(far);
-    }
-
-    /// Adds those of some points that lie in the directions of other points, or beside them.
-    pub(crate) fn add_beside(
-        &mut self,
-        asked: impl Iterator<Item = Point>,
-        points: impl Iterator<Item = Point>,
-    ) {
-        let asked: FxHashSet<[i32; 3]> = asked.flat_map(|p| beside(self.cell(&p).0)).collect();
-        for p in points {
-            if asked.contains(&self.cell(&p).0) {
-                self.add(&p);
-            }
-        }
-    }
-
-    /// Adds the measurements of another front of the same scanner.
-    #[expect(clippy::iter_over_hash_type, reason = "the least does not depend on the order")]
-    pub(crate) fn join(&mut self, other: Self) {
-        for (cell, far) in other.near {
-            let near = self.near.entry(cell).or_insert(far);
-            *near = near.min(far);
-        }
-    }
-
-    fn cell(&self, p: &Point) -> ([i32; 3], f32) {
-        let off = p - self.eye;
-        let far = off.norm().max(1e-9);
-        ((off / far / self.width).map(|v| v.floor() as i32).into(), far as f32)
-    }
-
-    /// Whether the beam to a point, or a neighbouring one, hit something in front of it.
-    pub(crate) fn is_behind(&self, p: &Point) -> bool {
-        let (cell, far) = self.cell(p);
-        beside(cell).any(|cell| self.near.get(&cell).is_some_and(|near| near + MIN_DEPTH < far))
-    }
-}
-
-/// A cell and its 26 neighbours.
-fn beside([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
-    (0..27).map(move |i: i32| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -199,32 +133,5 @@ mod tests {
             assert_eq!(is_behind_at(0.06, 1.0), [false; 2], "{far}");
             assert!(!shadow.is_grazed(&Point::new(-0.4, 0.0, 0.5)), "{far}");
         }
-    }
-
-    #[test]
-    fn points_just_beside_a_nearer_surface_are_behind_it() {
-        let mut front = Front::new(&ScannerAt { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
-        // A wire 2 m away.
-        (0..100).for_each(|i| front.add(&Point::new(2.0, 0.0, 0.5 + 0.006 * f64::from(i))));
-        for (p, is_behind) in [
-            ([2.06, 0.002, 0.8], true),
-            ([3.0, -0.004, 0.8], true),
-            ([2.01, 0.002, 0.8], false),
-            ([1.9, 0.0, 0.8], false),
-            ([2.06, 0.03, 0.8], false),
-        ] {
-            assert_eq!(front.is_behind(&Point::from(p)), is_behind, "{p:?}");
-        }
-    }
-
-    #[test]
-    fn a_wire_that_only_another_scanner_measured_has_points_behind_it() {
-        let mut front = Front::new(&ScannerAt { at: Point::new(0.0, 0.0, 1.0), step: 0.003 });
-        let wire = || (0..100).map(|i| Point::new(2.0, 0.0, 0.5 + 0.006 * f64::from(i)));
-        let (stray, beside) = (Point::new(2.1, 0.003, 0.8), Point::new(2.1, 0.05, 0.8));
-        front.add(&stray);
-        assert!(!front.is_behind(&stray));
-        front.add_beside([stray, beside].into_iter(), wire());
-        assert_eq!([stray, beside].map(|p| front.is_behind(&p)), [true, false]);
     }
 }

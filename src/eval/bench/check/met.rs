@@ -49,7 +49,7 @@ pub(super) fn unmet(scene: &Scene, out: &Path, engine: &Engine) -> Result<BTreeS
     let mut unmet = BTreeSet::new();
     for thing in &straight {
         if !is_met(thing)? {
-            unmet.insert(format!("hose {}", thing.0.name));
+            unmet.insert(format!("line {}", thing.0.name));
         }
     }
     Ok(unmet)

@@ -3,6 +3,7 @@
 
 mod bodies;
 mod draw;
+mod evidence;
 mod met;
 mod row;
 mod scene_robot;
@@ -21,6 +22,7 @@ use crate::job::{Job, Means};
 use crate::plan;
 use contract::{Error, Result};
 use draw::DrawnPath;
+use evidence::PointCounts;
 use export::{ResultFile, atomic};
 use robot::Model;
 use row::{CheckRow, PathRow};
@@ -74,6 +76,18 @@ pub fn checks(bench: &CheckBench, means: &Means, engine: &Engine) -> Result<Stri
     place.run(cases, case, all, engine)
 }
 
+/// What is true around a robot.
+struct SiteTruth<'a> {
+    paths: &'a PathTruths<'a>,
+    shapes: &'a Shapes,
+}
+
+/// What a check says of a robot's paths and of the points around it.
+struct SeenSite {
+    paths: Vec<PathRow>,
+    points: PointCounts,
+}
+
 /// Library, engine and request that all cells share.
 struct Bench<'a> {
     bench: &'a CheckBench,
@@ -113,7 +127,12 @@ impl Bench<'_> {
                 row.n_checked += 1;
                 if let Some(robot) = SceneRobot::of(&scene, models, robot) {
                     let truth = PathTruths::new(&robot, &shapes, &unmet)?;
-                    row.paths.extend(self.robot(&robot, &truth, thin, &job.out, row.seed)?);
+                    let truths = SiteTruth { paths: &truth, shapes: &shapes };
+                    let seen = self.robot(&robot, truths, thin, &job.out, row.seed)?;
+                    row.paths.extend(seen.paths);
+                    for (name, own) in seen.points {
+                        row.points.entry(name).or_default().add(own);
+                    }
                 }
             }
         }
@@ -121,15 +140,15 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// All paths of one robot.
+    /// All paths of one robot, and the points around it.
     fn robot(
         &self,
         robot: &SceneRobot<'_>,
-        truth: &PathTruths<'_>,
+        SiteTruth { paths: truth, shapes }: SiteTruth<'_>,
         mut paths: Vec<DrawnPath>,
         out: &Path,
         seed: u64,
-    ) -> Result<Vec<PathRow>> {
+    ) -> Result<SeenSite> {
         let &SceneRobot { scene, number, .. } = robot;
         let mut random = Random::keyed(&[seed, number as u64, 0x9A7]);
         paths.extend(draw::paths(robot, &truth.met, &mut random)?);
@@ -144,7 +163,8 @@ impl Bench<'_> {
         let choose = |result: &ResultFile, _: &_| nearest(result, scene, number);
         let look = |place: &RobotSite<'_>| {
             let one = |path: &DrawnPath| self.path(place, robot, path, truth);
-            paths.iter().map(one).collect::<Result<Vec<PathRow>>>()
+            let points = evidence::counts(robot, shapes, place.obstacles())?;
+            Ok(SeenSite { paths: paths.iter().map(one).collect::<Result<_>>()?, points })
         };
         at_robot(&request, choose, self.means, self.engine, look)
     }

@@ -1,6 +1,7 @@
 //! Rows of the path bench: truth and outcome of each path, and counts of each cell.
 
 use super::draw::PathKind;
+use super::evidence::PointCounts;
 use super::truth::True;
 use crate::eval::bench::cases::CaseRow;
 use serde::Serialize;
@@ -35,6 +36,8 @@ pub(super) struct CheckRow {
     /// Number of robots found with the right model.
     pub(super) n_checked: usize,
     pub(super) paths: Vec<PathRow>,
+    /// Cells of points around its robots by what they lie on.
+    pub(super) points: PointCounts,
     /// Scanning, the main job, and checking with its truth, seconds.
     pub(super) seconds: [f64; 3],
 }

@@ -1,6 +1,7 @@
 //! Tables of the path bench for people, and one line per path for programs.
 
 use super::super::sheet;
+use super::evidence::{PointCount, PointCounts};
 use super::row::{CheckRow, PathRow};
 use super::truth::True;
 use crate::check::{PathDoubt, PathOutcome};
@@ -72,8 +73,27 @@ pub(super) fn table(rows: &[CheckRow]) -> String {
     for path in every.iter().filter(|p| is_missed(p)) {
         let _ = writeln!(out, "MISSED: {}", path.line());
     }
+    out += &points(rows);
     for row in rows.iter().filter(|r| r.failed.is_some()) {
         let _ = writeln!(out, "- {}: {}", row.seed, row.failed.as_deref().unwrap_or_default());
+    }
+    out
+}
+
+/// Cells of points by what they lie on.
+fn points(rows: &[CheckRow]) -> String {
+    let mut all = PointCounts::new();
+    for (name, own) in rows.iter().flat_map(|row| &row.points) {
+        all.entry(name.clone()).or_default().add(*own);
+    }
+    if all.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from(
+        "\n| cells of points on | all | dropped as strays | kept |\n| --- | --- | --- | --- |\n",
+    );
+    for (name, PointCount { n, n_dropped }) in &all {
+        let _ = writeln!(out, "| {name} | {n} | {n_dropped} | {} |", n - n_dropped);
     }
     out
 }

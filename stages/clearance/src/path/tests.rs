@@ -51,7 +51,7 @@ fn walk_in(
     cells.remove_duplicates();
     let bounds = Aabb { min: [-9.0; 3], max: [9.0; 3] };
     let known = KnownBounds { world_from_base: Pose::identity(), bounds };
-    let mut around = Obstacles::new(&cells, &[], space, known);
+    let mut around = Obstacles::new(&cells, &[], space, known, &OneByOne);
     body.remove_robot(&[found], &mut around);
     let path: Vec<Vec<f64>> = path.iter().map(|v| vec![*v]).collect();
     let legs = legs(&body, &path);
@@ -207,6 +207,7 @@ fn space_of_which_nothing_is_known_is_not_free() {
         &[],
         None,
         known,
+        &OneByOne,
     );
     let path = [vec![0.0], vec![-1.0]];
     let legs = legs(&body, &path);
@@ -223,23 +224,32 @@ fn points_between_a_wire_that_another_scanner_knows_and_a_surface_are_no_obstacl
     let bounds = Aabb { min: [-4.0; 3], max: [4.0; 3] };
     let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
     space.voxels_mut().fill(SpaceKind::Free);
-    let n_near_zero = |has_wire: bool| {
+    let n_near_zero = |what: ObstacleKind, has_wire: bool, sees_past: bool| {
         let mut cells = Cells::within(2.0, &eyes);
         let mut add = |p: [f64; 3], source: u16| {
             cells.add_measurement(&p.into(), source);
-            cells.add(p, ObstacleKind::Fixed, false, source);
+            cells.add(p, what, false, source);
         };
         // All that the first scanner has of the wire, on a line 0.5 m behind it.
         (0..5).for_each(|k| add([0.0, 0.0, 0.03 * f64::from(k)], 1));
         if has_wire {
             (0..100).for_each(|k| add([-0.5, 0.0, 0.01 * f64::from(k) - 0.5], 2));
         }
+        if sees_past {
+            let at = |k: i32| 0.014 * f64::from(k) - 0.35;
+            (0..50 * 50).for_each(|k| add([at(k % 50), 1.9, at(k / 50)], 2));
+        }
         cells.remove_duplicates();
         let known = KnownBounds { world_from_base: Pose::identity(), bounds };
-        let around = Obstacles::new(&cells, &[], Some(&space), known);
-        let is_near_zero = |o: &&crate::obstacle::Obstacle| o.is_point() && o.at[0].abs() < 0.1;
+        let around = Obstacles::new(&cells, &[], Some(&space), known, &OneByOne);
+        let is_near_zero =
+            |o: &&crate::obstacle::Obstacle| o.is_point() && o.at[0].abs() < 0.1 && o.at[1] < 1.0;
         around.all.iter().filter(is_near_zero).count()
     };
     // Without the wire they may be a wire themselves.
-    assert_eq!([n_near_zero(false), n_near_zero(true)], [5, 0]);
+    let uncertain = |has_wire| n_near_zero(ObstacleKind::Uncertain, has_wire, false);
+    assert_eq!([uncertain(false), uncertain(true)], [5, 0]);
+    // Of those that are known to be fixed a scanner has to see past them.
+    let fixed = |sees_past| n_near_zero(ObstacleKind::Fixed, true, sees_past);
+    assert_eq!([fixed(false), fixed(true)], [5, 0]);
 }

@@ -1,0 +1,199 @@
+//! Points of things and stray points, as one or two scanners have them: which are evidence.
+
+use super::*;
+use crate::cells::{CellSight, Cells};
+use crate::shadow::ScannerAt;
+use contract::{OneByOne, SpaceGrid};
+use geometry::Aabb;
+
+const EYE: [f64; 3] = [-2.0, 0.0, 0.0];
+
+/// Tells of all obstacles that only a scanner at [`EYE`] measured them.
+struct OneEye;
+
+impl Sight for OneEye {
+    fn eyes(&self, _: usize) -> Vec<Point> {
+        vec![Point::from(EYE)]
+    }
+
+    fn are_of_others(&self, _: usize, _: usize) -> bool {
+        false
+    }
+
+    fn is_passed(&self, _: usize, _: &Obstacle) -> bool {
+        false
+    }
+
+    fn behind(&self, all: &[Obstacle], _: &[bool]) -> Vec<bool> {
+        vec![false; all.len()]
+    }
+}
+
+fn space_of(kind: SpaceKind) -> Space {
+    let bounds = Aabb { min: [-1.5; 3], max: [1.5; 3] };
+    let mut space = Space::unknown(SpaceGrid::over(&bounds, 0.05));
+    space.voxels_mut().fill(kind);
+    space
+}
+
+/// Places of a distant wall with 1 cm between points, which sets the density of the scan.
+fn wall() -> impl Iterator<Item = [f32; 3]> {
+    (0..2500).map(|i| [1.0, 0.01 * (i % 50) as f32, 0.01 * (i / 50) as f32])
+}
+
+/// Which of some uncertain points are evidence.
+fn evident_among(points: &[[f32; 3]], kind: SpaceKind) -> Vec<bool> {
+    evident_by(points, ObstacleKind::Uncertain, kind, false)
+}
+
+/// Which of some points of this kind, of grazing beams or not, are evidence.
+fn evident_by(points: &[[f32; 3]], what: ObstacleKind, kind: SpaceKind, grazed: bool) -> Vec<bool> {
+    let obstacle = |(at, is_grazed)| Obstacle { at, radius: 0.0035, what, is_grazed };
+    let mut all: Vec<Obstacle> = (points.iter().map(|p| (*p, grazed)))
+        .chain(wall().map(|p| (p, false)))
+        .map(obstacle)
+        .collect();
+    let space = space_of(kind);
+    let seen = SeenSpace { space: &space, world_from_base: &Pose::identity() };
+    let out = evident(&mut all, &OneEye, Some(seen), &OneByOne);
+    assert!(out[points.len()..].iter().all(|is| *is), "the wall stands");
+    out[..points.len()].to_vec()
+}
+
+#[test]
+fn strays_in_seen_space_are_evidence_of_nothing() {
+    let strays = [[0.0, 0.0, 0.0], [0.03, 0.02, -0.02], [-0.02, 0.05, 0.05], [0.3, 0.3, 0.1]];
+    assert_eq!(evident_among(&strays, SpaceKind::Free), [false; 4]);
+    // Where no beam passed, each of them may be an object.
+    assert_eq!(evident_among(&strays, SpaceKind::Unknown), [true; 4]);
+    // Fixed points stay, since no beam passed their places.
+    assert_eq!(evident_by(&strays, ObstacleKind::Fixed, SpaceKind::Free, false), [true; 4]);
+    assert_eq!(evident_by(&strays, ObstacleKind::Fixed, SpaceKind::Free, true), [true; 4]);
+}
+
+#[test]
+fn a_small_thing_of_four_points_stays() {
+    let hook = [[0.0, 0.0, 0.0], [0.012, 0.0, 0.0], [0.0, 0.0, 0.012], [0.012, 0.0, 0.012]];
+    assert_eq!(evident_among(&hook, SpaceKind::Free), [true; 4]);
+}
+
+#[test]
+fn a_wire_that_few_beams_met_stays() {
+    // Points 4 cm apart with a noise of 3 mm.
+    let noise = |i: usize| [0.003, -0.002, 0.001, -0.003][i % 4];
+    let wire: Vec<[f32; 3]> =
+        (0..9).map(|i| [noise(i), noise(i + 1), 0.04 * i as f32 - 0.16]).collect();
+    assert_eq!(evident_among(&wire, SpaceKind::Free), [true; 9]);
+}
+
+fn grazed_among(points: &[[f32; 3]], kind: SpaceKind) -> Vec<bool> {
+    evident_by(points, ObstacleKind::Uncertain, kind, true)
+}
+
+#[test]
+fn a_wire_that_stands_behind_an_edge_by_chance_stays() {
+    let noise = |i: usize| [0.002, -0.002, 0.001, -0.003][i % 4];
+    let mut all: Vec<[f32; 3]> =
+        (0..60).map(|i| [noise(i), noise(i + 1), 0.01 * i as f32]).collect();
+    // Some points of the edge itself are among them.
+    all.extend((0..5).map(|i| [-0.05 * i as f32, 0.02, 0.1 * i as f32]));
+    assert_eq!(grazed_among(&all, SpaceKind::Free)[..60], [true; 60]);
+}
+
+#[test]
+fn a_wall_of_few_beams_behind_an_edge_stays() {
+    let noise = |i: usize| [0.002, -0.002, 0.001, -0.003][i % 4];
+    // Beams 3 cm apart on a wall that stands askew, at 45° to them.
+    let of = |i: usize| [(i % 8) as f32 * 0.03, (i / 8) as f32 * 0.03];
+    let all: Vec<[f32; 3]> =
+        (0..64).map(|i| [0.2 + of(i)[0] + noise(i), of(i)[0], of(i)[1]]).collect();
+    assert_eq!(grazed_among(&all, SpaceKind::Free), [true; 64]);
+}
+
+#[test]
+fn stray_points_are_not_attached() {
+    let hose = (0..40).map(|i| ([0.01 * i as f32, 0.0, 0.0], i % 5 == 0));
+    let curtain = (0..20).map(|i| ([0.0, 0.3, 0.01 * i as f32], true));
+    let all: Vec<_> = hose.chain(curtain).chain([([0.0, -0.4, 0.0], false)]).collect();
+    let left = attached_points(&all);
+    assert_eq!(left, all[..40].iter().map(|(p, _)| *p).collect::<Vec<_>>());
+}
+
+#[test]
+fn uncertain_points_of_grazing_beams_count_only_on_surfaces_of_others() {
+    // Behind an upright edge, at any depth, which no line has in common.
+    let depth = |i: usize| (i * i * 37 % 53) as f32 * 0.01;
+    let curtain: Vec<[f32; 3]> = (0..30).map(|i| [depth(i), 0.0, 0.01 * i as f32]).collect();
+    assert_eq!(grazed_among(&curtain, SpaceKind::Free), [false; 30]);
+    assert_eq!(grazed_among(&curtain, SpaceKind::Unknown), [false; 30]);
+    // Behind a tip, along the beam.
+    let tail: Vec<[f32; 3]> = (0..30).map(|i| [0.01 * i as f32, 0.0, 0.0]).collect();
+    assert_eq!(grazed_among(&tail, SpaceKind::Free), [false; 30]);
+    // Points at the wall belong to the wall.
+    let at_wall = [[0.99, 0.2, 0.2], [1.01, 0.305, 0.1]];
+    assert_eq!(grazed_among(&at_wall, SpaceKind::Free), [true; 2]);
+}
+
+/// Scanners at [`EYE`] and at its side, with beams that are 4 mm apart at the origin.
+const SIDE: [f64; 3] = [0.0, -2.0, 0.0];
+const STEP: f64 = 0.002;
+
+/// Which fixed points, of the scanners with these numbers, are evidence where also a wall behind
+/// stands that the scanner at the side sees past them, but for the beams that `hits` stops.
+fn fixed_among(points: &[([f64; 3], u16)], hits: impl Fn(&Point) -> bool) -> Vec<bool> {
+    let eyes = [EYE, SIDE].map(|at| ScannerAt { at: Point::from(at), step: STEP });
+    let eyes = [(1, eyes[0]), (2, eyes[1])].into_iter().collect();
+    let mut cells = Cells::within(1.5, &eyes);
+    let mut add = |p: [f64; 3], source: u16| {
+        cells.add_measurement(&Point::from(p), source);
+        cells.add(p, ObstacleKind::Fixed, false, source);
+    };
+    points.iter().for_each(|(p, source)| add(*p, *source));
+    // Each beam from the side ends 1 m behind the points.
+    for k in 0..400 * 200 {
+        let [x, z] = [k % 400 - 200, k / 400 - 100].map(|v| f64::from(v) * STEP * 3.0);
+        let end = Point::new(x, 1.0, z);
+        if !hits(&end) {
+            add(end.coords.into(), 2);
+        }
+    }
+    cells.remove_duplicates();
+    let mut all = cells.obstacles();
+    let space = space_of(SpaceKind::Free);
+    let seen = SeenSpace { space: &space, world_from_base: &Pose::identity() };
+    let is_evident = evident(&mut all, &CellSight::new(&cells), Some(seen), &OneByOne);
+    let of = |p: &[f64; 3]| {
+        let near = |o: &Obstacle| (place(o) - Point::from(*p)).norm() < 0.004;
+        all.iter().position(near).map(|at| is_evident[at])
+    };
+    points.iter().map(|(p, _)| of(p).expect("its cell")).collect()
+}
+
+/// A curtain behind an upright edge, at many depths along the beams from [`EYE`].
+fn curtain() -> Vec<([f64; 3], u16)> {
+    let depth = |i: i32| f64::from(i * i * 37 % 53) * 0.01 - 0.2;
+    (0..20).map(|i| ([depth(i), 0.0, 0.02 * f64::from(i) - 0.2], 1)).collect()
+}
+
+#[test]
+fn a_fixed_point_is_dropped_only_where_beams_of_another_scanner_passed() {
+    let curtain = curtain();
+    assert_eq!(fixed_among(&curtain, |_| false), [false; 20]);
+    // The scanner at the side had no beam there.
+    assert_eq!(fixed_among(&curtain, |_| true), [true; 20]);
+}
+
+#[test]
+fn a_wire_that_another_scanner_sees_past_stays() {
+    // Too thin for the beams of the one at the side, and met by few of the other one's.
+    let noise = |i: i32| [0.002, -0.002, 0.001, -0.002][i as usize % 4];
+    let wire: Vec<_> =
+        (0..14).map(|i| ([noise(i), noise(i + 1), 0.045 * f64::from(i) - 0.3], 1)).collect();
+    assert_eq!(fixed_among(&wire, |_| false), [true; 14]);
+}
+
+#[test]
+fn points_at_which_two_scanners_agree_stay() {
+    let here = [([0.0, 0.0, 0.0], 1), ([0.012, 0.012, 0.0], 2)];
+    assert_eq!(fixed_among(&here, |_| false), [true; 2]);
+}

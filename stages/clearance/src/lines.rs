@@ -1,0 +1,122 @@
+//! Whether points about a place lie on a line or a plane through it that does not follow a beam.
+
+use geometry::Point;
+
+/// From one point to another, metres.
+pub(crate) type Offset = nalgebra::Vector3<f32>;
+
+/// Thickness of a line, metres: the wire, the scanner's noise, and the edge of a cell.
+pub(crate) const LINE_THICKNESS: f32 = 0.010;
+/// Number of other points that make a line.
+const ON_LINE: usize = 3;
+/// Number of other points that make a line of doubtful points, and their least share of all points
+/// about: a curtain behind an edge has points all over.
+const ON_CLEAR_LINE: usize = 8;
+const CLEAR_SHARE: f64 = 0.7;
+/// Number of points, the farthest ones, through which such a line is tried.
+const N_LINES: usize = 4;
+/// Largest distance of neighbours on a plane of doubtful points, metres: a wall at 6 m has ten
+/// points about each, of beams 0.15° apart that meet it at 60°.
+const PLANE_REACH: f32 = 0.10;
+/// Least standard deviation of such a plane's points along both of its directions, metres; along a
+/// line it is less in one.
+const PLANE_WIDTH: f32 = 0.015;
+/// Least sine of the angle between such a line or plane and a beam to it: an edge or a tip in front
+/// leaves points along the beam. 15°.
+const ACROSS_BEAM: f64 = 0.26;
+/// Distance up to which points count on a long line, metres.
+pub(crate) const LONG_REACH: f32 = 0.40;
+/// Length of a stretch of a long line in which all points count once, metres, and least number of
+/// stretches with points.
+const STRETCH: f32 = 0.02;
+const N_STRETCHES: usize = 6;
+/// Largest number of stretches for each one with points: a curtain of few points has lines with
+/// larger gaps.
+const MAX_SPACING: usize = 3;
+/// Distance from a long line within which most points are to lie on it, metres.
+const BESIDE_LINE: f32 = 0.06;
+/// Number of directions, of the nearest points, in which a long line is looked for.
+const N_DIRECTIONS: usize = 24;
+
+/// Whether enough points lie on a line through the origin.
+pub(crate) fn is_on_line(near: &[Offset]) -> bool {
+    // Points that are too near define no direction.
+    near.iter()
+        .filter(|v| v.norm() > 2.0 * LINE_THICKNESS)
+        .any(|v| n_along(near, &v.normalize()) >= ON_LINE)
+}
+
+/// Whether most of the points lie on one line through the origin, which is at `here`, that does not
+/// follow a beam.
+pub(crate) fn is_on_clear_line(near: &mut [Offset], here: &Point, eyes: &[Point]) -> bool {
+    let most = (near.len() as f64 * CLEAR_SHARE).ceil() as usize;
+    if near.len() < ON_CLEAR_LINE {
+        return false;
+    }
+    near.sort_by(|a, b| b.norm_squared().total_cmp(&a.norm_squared()));
+    near[..N_LINES]
+        .iter()
+        .map(|v| v.normalize())
+        .any(|unit| n_along(near, &unit) >= most.max(ON_CLEAR_LINE) && is_across(&unit, here, eyes))
+}
+
+/// Whether the origin, which is at `here`, lies on a long line that does not follow a beam, with
+/// little beside it: on a wire that few beams met.
+pub(crate) fn is_on_long_line(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
+    let mut nearest: Vec<&Offset> =
+        near.iter().filter(|v| v.norm() > 2.0 * LINE_THICKNESS).collect();
+    nearest.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
+    nearest.iter().take(N_DIRECTIONS).map(|v| v.normalize()).any(|unit| {
+        let (mut n, mut n_beside) = (0_usize, 0_usize);
+        let mut stretches = Vec::new();
+        for w in near {
+            let along = w.dot(&unit);
+            let off = (w - unit * along).norm();
+            n_beside += usize::from(off < BESIDE_LINE);
+            if off < LINE_THICKNESS {
+                n += 1;
+                stretches.push((along / STRETCH).floor() as i32);
+            }
+        }
+        stretches.sort_unstable();
+        stretches.dedup();
+        let length = stretches.last().zip(stretches.first()).map_or(0, |(b, a)| b - a + 1);
+        stretches.len() >= N_STRETCHES
+            && stretches.len() * MAX_SPACING >= length as usize
+            && n as f64 >= CLEAR_SHARE * n_beside as f64
+            && is_across(&unit, here, eyes)
+    })
+}
+
+/// Whether most of the points near the origin, which is at `here`, lie on one plane through it that
+/// does not follow a beam.
+pub(crate) fn is_on_clear_plane(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
+    let near: Vec<Offset> = near.iter().filter(|v| v.norm() < PLANE_REACH).copied().collect();
+    let most = (near.len() as f64 * CLEAR_SHARE).ceil() as usize;
+    if near.len() < ON_CLEAR_LINE {
+        return false;
+    }
+    let spread: nalgebra::Matrix3<f32> = near.iter().map(|v| v * v.transpose()).sum();
+    let eigen = (spread / near.len() as f32).symmetric_eigen();
+    let across = eigen.eigenvalues.imin();
+    let mut is_wide = (0..3).filter(|k| *k != across);
+    let normal: Offset = eigen.eigenvectors.column(across).into_owned();
+    let is_faced = |eye: &Point| {
+        let beam = (here - eye).normalize();
+        beam.dot(&normal.map(f64::from)).abs() > ACROSS_BEAM
+    };
+    is_wide.all(|k| eigen.eigenvalues[k] > PLANE_WIDTH * PLANE_WIDTH)
+        && near.iter().filter(|v| v.dot(&normal).abs() < LINE_THICKNESS).count() >= most
+        && eyes.iter().all(is_faced)
+}
+
+/// Whether a direction leads across all beams to a place.
+fn is_across(unit: &Offset, here: &Point, eyes: &[Point]) -> bool {
+    let unit = unit.map(f64::from);
+    eyes.iter().all(|eye| unit.cross(&(here - eye).normalize()).norm() > ACROSS_BEAM)
+}
+
+/// Number of places near the line through the origin with this direction.
+fn n_along(near: &[Offset], unit: &Offset) -> usize {
+    near.iter().filter(|w| (*w - unit * w.dot(unit)).norm() < LINE_THICKNESS).count()
+}
