@@ -13,6 +13,7 @@ import { createRequire } from "node:module";
 import { existsSync, readFileSync, mkdirSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 import { resolve, join } from "node:path";
+import { Pictures, ground, rest, samePicture } from "./report_pictures.mjs";
 
 const require = createRequire(join(process.env.NODE_PATH || ".", "x.js"));
 const { chromium } = require("playwright-core");
@@ -48,13 +49,6 @@ async function open(width, height, colorScheme) {
   const took = Date.now() - from;
   await rest(page);
   return { page, said, asked, took, whole: Date.now() - from, context };
-}
-
-/** Waits until everything is drawn. */
-async function rest(page) {
-  await page.evaluate(() => { delete document.documentElement.dataset.drawn; });
-  await page.locator("#canvas").dispatchEvent("wheel", { deltaY: 0 });
-  await page.waitForFunction(() => document.documentElement.dataset.drawn, null, { timeout: 120_000 });
 }
 
 const picture = async (page) => (await page.locator("#canvas").screenshot()).toString("base64");
@@ -175,7 +169,10 @@ async function look(width, height, scheme) {
   const serious = found.violations.filter((v) => ["serious", "critical"].includes(v.impact));
   for (const v of found.violations) console.log(`       axe ${v.impact}: ${v.id}: ${v.nodes[0].html.slice(0, 120)}`);
   check(serious.length === 0, `${name}: axe finds no serious fault`, `${found.violations.length} in all`);
-  return { page, said, asked, context };
+  await ground(page, scheme, (isRight, what, detail) => check(isRight, `${name}: ${what}`, detail));
+  const picture = process.env.ONLY === "rest" ? null
+    : await new Pictures(page, name, result, check).all();
+  return { page, said, asked, context, picture };
 }
 
 async function moves(page) {
@@ -281,6 +278,10 @@ if (process.env.ONLY !== "rest") {
 await first.page.emulateMedia({ media: "print" });
 if (shots) writeFileSync(join(shots, "print.pdf"), await first.page.pdf({ format: "A4" }));
 const others = [await look(1280, 800, "dark"), await look(390, 844, "light"), await look(390, 844, "dark")];
+if (first.picture) {
+  check(samePicture(first.picture, others[0].picture), "1280: the view is the same in light and dark");
+  check(samePicture(others[1].picture, others[2].picture), "390: the view is the same in light and dark");
+}
 for (const { said, asked } of [first, ...others]) {
   check(said.length === 0, "the console is empty", said.slice(0, 3).join(" | "));
   check(asked.length === 0, "nothing is requested", asked.slice(0, 3).join(" "));
