@@ -19,6 +19,9 @@ const FRAME = 10;
 const HUE = 9;
 /** Share of the drawn pixels of a class that have the legend's colour. The rest is rounding of dark pixels. */
 const OF_HUE = 0.9;
+/** Share of what a moved joint changes that is nearer to the name of its robot than to any other: an arm may
+ * reach towards another robot. */
+const OWN = 0.7;
 
 /** Waits until everything is drawn. */
 export async function rest(page) {
@@ -108,11 +111,16 @@ function ofColor(picture, mask, color) {
   return n / Math.max(1, count(mask));
 }
 
-/** The middle of a mask, pixels. */
-function middle(mask, width) {
-  let [x, y, n] = [0, 0, 0];
-  mask.forEach((v, i) => { if (v) { x += i % width; y += Math.floor(i / width); n += 1; } });
-  return [x / n, y / n];
+/** How many pixels of a mask are nearest to each of some places, by their names. */
+function nearest(mask, width, places) {
+  const out = new Map(places.map((p) => [p.id, 0]));
+  mask.forEach((v, i) => {
+    if (!v) return;
+    const away = (p) => Math.hypot(p.x - i % width, p.y - Math.floor(i / width));
+    const { id } = places.reduce((best, p) => away(p) < away(best) ? p : best);
+    out.set(id, out.get(id) + 1);
+  });
+  return out;
 }
 
 /** The switches of the panel: name, whether on, and the colour of the legend. */
@@ -158,6 +166,16 @@ export class Pictures {
     await page.locator("#joints button", { hasText: "Show" }).click();
     await rest(page);
     await this.names("near a robot");
+    const keys = async (...all) => {
+      await page.locator("#canvas").focus();
+      for (const key of all) await page.keyboard.press(key);
+      await rest(page);
+    };
+    await keys("r", ...Array(9).fill("-"));
+    await this.names("from afar");
+    // The plant goes to the corner with the buttons.
+    await keys(...Array(12).fill("Shift+ArrowUp"), ...Array(9).fill("Shift+ArrowRight"));
+    await this.names("in the corner");
     await page.locator("#tools [data-do=home]").click();
     await rest(page);
     return this.first;
@@ -230,7 +248,8 @@ export class Pictures {
       for (let y = y0; y < y1; y++) at.fill(1, y * on.width + x0, y * on.width + x1);
     }
     const beside = count(without(changed, at));
-    this.say(boxes.length > 0 && count(changed) > 100 * boxes.length && beside <= STRAYS,
+    const isEnough = boxes.length > 0 || where === "in the corner";
+    this.say(isEnough && count(changed) >= 100 * boxes.length && beside <= STRAYS,
       `${where}, without names all but the names is as before`, `${boxes.length} names, ${beside} pixels beside them`);
     const within = boxes.every(([l, t, r, b]) => l >= 0 && t >= 0 && r <= on.width && b <= on.height);
     this.say(within, `${where}, names lie within the view`);
@@ -333,10 +352,10 @@ export class Pictures {
       const beside = count(without(changed, wider(changes.reduce(either), first.width)));
       this.say(count(changed) > 10 * STRAYS && beside <= STRAYS, `a joint of ${id} moves its robot alone`,
         `${count(changed)} pixels, ${beside} of them elsewhere`);
-      const [x, y] = middle(changed, first.width);
-      const away = (p) => Math.hypot(p.x - x, p.y - y);
-      const [nearest] = [...named].sort((a, b) => away(a) - away(b));
-      if (named.some((p) => p.id === id)) this.say(nearest.id === id, `what changed is at ${id}`);
+      if (named.some((p) => p.id === id)) {
+        const share = nearest(changed, first.width, named).get(id) / count(changed);
+        this.say(share >= OWN, `what changed is at ${id}`, `${(100 * share).toFixed(0)} % is nearest to it`);
+      }
       for (const name of ["Robots, points", `Robots, ${verdict}`]) {
         const at = ofRobots.indexOf(name);
         const left = count(both(changes[at], differs(before.get(name), this.empty, DRAWN)));
