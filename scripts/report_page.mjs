@@ -1,7 +1,8 @@
 // Opens the page of a result in a headless Chromium with the network off and checks it: no error on
 // the console, no request, no serious fault for axe, numbers as in result.json, and that turning,
-// choosing, filtering and moving a joint change what is seen. Four sizes and schemes; frames a second
-// while it moves. Not part of CI, which has no browser.
+// choosing, filtering and moving a joint change what they should and nothing else
+// (`report_pictures.mjs`). Four sizes and schemes; frames a second while it moves. Not part of CI,
+// which has no browser. `report_breaks.mjs` shows that it can fail.
 //
 // `BASE=FOLDER` compares the screenshots with those of an earlier call: no more than one pixel of two
 // hundred may differ. `ONLY=rest` takes screenshots alone.

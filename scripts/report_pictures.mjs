@@ -350,7 +350,7 @@ export class Pictures {
       const changes = ofRobots.map((name) => differs(before.get(name), after.get(name), DRAWN));
       const changed = differs(before.get("all"), after.get("all"));
       const beside = count(without(changed, wider(changes.reduce(either), first.width)));
-      this.say(count(changed) > 10 * STRAYS && beside <= STRAYS, `a joint of ${id} moves its robot alone`,
+      this.say(count(changed) > STRAYS && beside <= STRAYS, `a joint of ${id} moves its robot alone`,
         `${count(changed)} pixels, ${beside} of them elsewhere`);
       if (named.some((p) => p.id === id)) {
         const share = nearest(changed, first.width, named).get(id) / count(changed);
@@ -359,7 +359,7 @@ export class Pictures {
       for (const name of ["Robots, points", `Robots, ${verdict}`]) {
         const at = ofRobots.indexOf(name);
         const left = count(both(changes[at], differs(before.get(name), this.empty, DRAWN)));
-        this.say(left > STRAYS, `"${name}" of ${id} went along`, `${left} pixels left their place`);
+        this.say(left > 0, `"${name}" of ${id} went along`, `${left} pixels left their place`);
       }
       await page.locator("#joints button", { hasText: "As found" }).click();
       this.same(first, await seen(page), `${id} as found looks as before`);
