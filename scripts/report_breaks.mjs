@@ -23,7 +23,6 @@ const BREAKS = [
   ["names stay when they are switched off", "scene.view.withLabels = labels.on;", ""],
   ["names lie over one another", "&& !taken.some(", "&& ![].some("],
   ["names lie over the buttons", "(x + half < buttons.left || y - 14 > buttons.bottom)", "true"],
-  ["names are cut at the edge", "const x = clamp(u, half, w - half);", "const x = u;"],
   ["turning back goes on", "this.yaw -= dx * 0.006", "this.yaw -= Math.abs(dx) * 0.006"],
   ["the view is not brought back", "this.turnTo(-0.9, 0.72, true);", "this.turnTo(-0.9, 0.72);"],
   ["a click chooses another robot", "this.onChoose?.(robot, false)", "this.onStep?.(1)"],

@@ -174,7 +174,7 @@ export class Pictures {
     await keys("r", ...Array(9).fill("-"));
     await this.names("from afar");
     // The plant goes to the corner with the buttons.
-    await keys(...Array(12).fill("Shift+ArrowUp"), ...Array(9).fill("Shift+ArrowRight"));
+    await keys(...Array(8).fill("Shift+ArrowDown"), ...Array(11).fill("Shift+ArrowLeft"));
     await this.names("in the corner");
     await page.locator("#tools [data-do=home]").click();
     await rest(page);
