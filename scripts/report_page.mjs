@@ -1,7 +1,8 @@
 // Opens the page of a result in a headless Chromium with the network off and checks it: no error on
 // the console, no request, no serious fault for axe, numbers as in result.json, and that turning,
-// choosing, filtering and moving a joint change what is seen. Four sizes and schemes; frames a second
-// while it moves. Not part of CI, which has no browser.
+// choosing, filtering and moving a joint change what they should and nothing else
+// (`report_pictures.mjs`). Four sizes and schemes; frames a second while it moves. Not part of CI,
+// which has no browser. `report_breaks.mjs` shows that it can fail.
 //
 // `BASE=FOLDER` compares the screenshots with those of an earlier call: no more than one pixel of two
 // hundred may differ. `ONLY=rest` takes screenshots alone.
@@ -13,6 +14,7 @@ import { createRequire } from "node:module";
 import { existsSync, readFileSync, mkdirSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 import { resolve, join } from "node:path";
+import { Pictures, ground, rest, samePicture } from "./report_pictures.mjs";
 
 const require = createRequire(join(process.env.NODE_PATH || ".", "x.js"));
 const { chromium } = require("playwright-core");
@@ -48,13 +50,6 @@ async function open(width, height, colorScheme) {
   const took = Date.now() - from;
   await rest(page);
   return { page, said, asked, took, whole: Date.now() - from, context };
-}
-
-/** Waits until everything is drawn. */
-async function rest(page) {
-  await page.evaluate(() => { delete document.documentElement.dataset.drawn; });
-  await page.locator("#canvas").dispatchEvent("wheel", { deltaY: 0 });
-  await page.waitForFunction(() => document.documentElement.dataset.drawn, null, { timeout: 120_000 });
 }
 
 const picture = async (page) => (await page.locator("#canvas").screenshot()).toString("base64");
@@ -175,7 +170,10 @@ async function look(width, height, scheme) {
   const serious = found.violations.filter((v) => ["serious", "critical"].includes(v.impact));
   for (const v of found.violations) console.log(`       axe ${v.impact}: ${v.id}: ${v.nodes[0].html.slice(0, 120)}`);
   check(serious.length === 0, `${name}: axe finds no serious fault`, `${found.violations.length} in all`);
-  return { page, said, asked, context };
+  await ground(page, scheme, (isRight, what, detail) => check(isRight, `${name}: ${what}`, detail));
+  const picture = process.env.ONLY === "rest" ? null
+    : await new Pictures(page, name, result, check).all();
+  return { page, said, asked, context, picture };
 }
 
 async function moves(page) {
@@ -281,6 +279,10 @@ if (process.env.ONLY !== "rest") {
 await first.page.emulateMedia({ media: "print" });
 if (shots) writeFileSync(join(shots, "print.pdf"), await first.page.pdf({ format: "A4" }));
 const others = [await look(1280, 800, "dark"), await look(390, 844, "light"), await look(390, 844, "dark")];
+if (first.picture) {
+  check(samePicture(first.picture, others[0].picture), "1280: the view is the same in light and dark");
+  check(samePicture(others[1].picture, others[2].picture), "390: the view is the same in light and dark");
+}
 for (const { said, asked } of [first, ...others]) {
   check(said.length === 0, "the console is empty", said.slice(0, 3).join(" | "));
   check(asked.length === 0, "nothing is requested", asked.slice(0, 3).join(" "));

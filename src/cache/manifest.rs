@@ -137,8 +137,10 @@ impl Manifest {
         files
     }
 
-    /// Lists the files in `next`, with the checksums in `known` where they are given.
+    /// Lists the files in `next`, with the checksums in `known` where they are given; `stage` is
+    /// the name of this work.
     pub(crate) fn list(
+        stage: &'static str,
         next: &Path,
         key: Option<super::Key>,
         outcome: &Outcome,
@@ -151,7 +153,7 @@ impl Manifest {
         paths.sort();
         let known: HashMap<&str, &OutputFile> =
             known.iter().map(|f| (f.path.as_str(), f)).collect();
-        let files = engine.fan_out("list", paths, |path| {
+        let files = engine.fan_out(stage, paths, |path| {
             let listed = known.get(name(next, &path).as_str()).map(|file| (*file).clone());
             listed.map_or_else(|| output(next, &path, Algorithm::Blake3), Ok)
         })?;

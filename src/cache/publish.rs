@@ -33,10 +33,10 @@ impl WholeResult<'_> {
     ) -> Result<Vec<String>> {
         let Self { job, output, digests, outcome, files } = self;
         let (next, key) = (output.next(), digests.result_key(job));
-        let listed = Manifest::list(next, key.clone(), outcome, files, engine)?;
+        let listed = Manifest::list("list", next, key.clone(), outcome, files, engine)?;
         let known = listed.files.clone();
         let mut told = add(&VerifiedFiles::unpublished(next, listed))?;
-        Manifest::list(next, key, outcome, known, engine)?.write(next)?;
+        Manifest::list("list_page", next, key, outcome, known, engine)?.write(next)?;
         let (manifest, removed) = Manifest::publish(next, output.out())?;
         digests.remember(&manifest, output.out())?;
         told.extend(removed);

@@ -185,7 +185,7 @@ mod tests {
         std::fs::write(dir.path().join("labels/0.kind.npy"), b"labels").expect("writes");
         let outcome = Outcome { summary: "all \"well\"".into(), ..Outcome::default() };
         let key = Some(Key::of("test", &[]));
-        let list = Manifest::list(dir.path(), key, &outcome, Vec::new(), &Engine::new(1));
+        let list = Manifest::list("list", dir.path(), key, &outcome, Vec::new(), &Engine::new(1));
         list.expect("lists").write(dir.path()).expect("writes");
         dir
     }

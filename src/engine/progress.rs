@@ -349,7 +349,7 @@ impl Running {
     fn draw(&self, bar: &ProgressBar, state: &StageState<'_>) {
         let inner = &self.progress.0;
         if state.is_over {
-            if inner.tells_stages {
+            if inner.tells_stages && *state.done != Amount::default() {
                 self.progress.say(&format!("{}: {}", title(&self.name), words(state)));
             }
             if inner.n_running.fetch_sub(1, Ordering::Relaxed) == 1 {
@@ -374,6 +374,8 @@ impl Running {
             (Mode::None, _) => {}
             (Mode::Json, _) => self.progress.line(&json(&self.name, &state)),
             (_, Some(bar)) => self.draw(bar, &state),
+            // Nothing was there to be done.
+            (_, None) if last && done == Amount::default() => {}
             (_, None) => {
                 let words = words(&state);
                 self.progress.line(&format!("{}: {words}", title(&self.name)));

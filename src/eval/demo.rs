@@ -49,13 +49,14 @@ pub fn run(
     let scanned = started.elapsed().as_secs_f64();
     let job =
         Job::new(vec![dir.join("scans/scans.e57")], robots, dir.join("result"), means.clone());
+    let n_scanning = engine.progress.reports().len();
     let started = Instant::now();
     let outcome = plan::run(&job, engine)?;
     let seconds = started.elapsed().as_secs_f64();
     let run = MeasuredRun {
         seconds,
         peak_memory_bytes: peak_memory(),
-        stages: &engine.progress.reports(),
+        stages: &engine.progress.reports()[n_scanning..],
     };
     RunRecord::keep(&job.out, &run, means, &outcome)?;
     let agreement = Agreement::of(&job.out, &dir.join("scans/truth"))?;

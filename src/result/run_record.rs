@@ -5,6 +5,7 @@ use crate::cache::VerifiedFiles;
 use crate::engine::progress::{StageReport, title};
 use crate::io::own_paths::without_links;
 use crate::job::{Means, Outcome, memory_words};
+use contract::words::count;
 use contract::{Error, Kind, Result};
 use export::atomic;
 use serde::{Deserialize, Serialize};
@@ -72,6 +73,7 @@ impl RunRecord {
             n_items: report.n_items,
             n_points: report.n_points,
         };
+        let did_something = |report: &&StageReport| report.n_items + report.n_points > 0;
         let record = Self {
             schema: SCHEMA.into(),
             result,
@@ -80,7 +82,7 @@ impl RunRecord {
             memory_bytes: means.memory_bytes,
             n_threads: means.n_threads,
             reused: outcome.reused.clone(),
-            stages: run.stages.iter().map(stage).collect(),
+            stages: run.stages.iter().filter(did_something).map(stage).collect(),
         };
         let text = serde_json::to_string_pretty(&record).map_err(|e| {
             Error::new(Kind::Bug, "the record of the run cannot be written").because(e)
@@ -101,15 +103,17 @@ impl RunRecord {
 
     /// Lines for people: what each is about, and its words.
     pub(crate) fn words(&self) -> Vec<(String, String)> {
-        let mut lines =
-            vec![("time".into(), format!("{:.1} s, {} threads", self.seconds, self.n_threads))];
+        let mut lines = vec![(
+            "time".into(),
+            format!("{:.1} s, {}", self.seconds, count(self.n_threads as u64, "thread")),
+        )];
         let limit = memory_words(self.memory_bytes);
         let peak = self.peak_memory_bytes.map_or_else(|| "unknown".into(), memory_words);
         lines.push(("memory".into(), format!("{peak} at most, {limit} allowed")));
         for stage in &self.stages {
             let rate = stage.n_points as f64 / stage.seconds.max(1e-3) / 1e6;
             let words = match stage.n_points {
-                0 => format!("{:>7.1} s, {} items", stage.seconds, stage.n_items),
+                0 => format!("{:>7.1} s, {}", stage.seconds, count(stage.n_items, "item")),
                 n => format!("{:>7.1} s, {n} points, {rate:.1} M points/s", stage.seconds),
             };
             lines.push((format!("  {}", title(&stage.name)), words));

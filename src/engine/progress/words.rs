@@ -6,11 +6,24 @@ use contract::words::count;
 
 /// Width of the bar, columns.
 const BAR: usize = 16;
+/// Share of points or bytes, and time, from which their rate tells when they end: buffers fill and
+/// disks wake up before.
+const TELLING_SHARE: f64 = 0.05;
+const TELLING_SECONDS: f64 = 2.0;
+/// Number of items, a quarter of all, from which they tell how long the others take: one region
+/// takes ten times as long as another.
+const TELLING_ITEMS: u64 = 4;
 
-/// Estimated seconds that remain, at the average rate so far; `None` where no total is known.
+/// Estimated seconds that remain, at the average rate so far; `None` where no total is known, and
+/// at the beginning, when the rate says little.
 fn eta(done: &Amount, total: &Amount, seconds: f64) -> Option<f64> {
-    let share = done.share(total).filter(|s| *s > 0.0)?;
-    Some(seconds * (1.0 - share) / share)
+    let share = done.share(total)?;
+    let is_told = if total.points > 0 || total.bytes > 0 {
+        share >= TELLING_SHARE && seconds >= TELLING_SECONDS
+    } else {
+        share >= 0.5 || share >= 0.25 && done.items >= TELLING_ITEMS
+    };
+    is_told.then(|| seconds * (1.0 - share) / share)
 }
 
 /// What people are told that a stage does; programs get its name.
@@ -27,7 +40,11 @@ pub(crate) fn title(name: &str) -> &str {
         "segment" => "points of robots",
         "write" => "labelling points",
         "compare" => "comparing scans",
-        "list" | "verify" => "checking files",
+        "list" => "listing files",
+        "list_page" => "listing the page",
+        "verify" => "checking files",
+        "review" => "reviewed postures",
+        "hints" => "reviewed places",
         "page" => "report page",
         name => name,
     }
@@ -131,7 +148,7 @@ pub(super) fn words(state: &StageState<'_>) -> String {
     match eta(done, total, seconds) {
         _ if last => words.push(format!("done in {seconds:.1} s")),
         Some(eta) => words.push(format!("{eta:.0} s to go")),
-        None => words.push(format!("{seconds:.0} s")),
+        None => words.push(format!("{seconds:.0} s so far")),
     }
     words.join(", ")
 }
@@ -185,12 +202,25 @@ mod tests {
         let (done, total) = (Amount::points(25), Amount::points(100));
         assert_eq!(eta(&done, &total, 10.0), Some(30.0));
         assert_eq!(eta(&Amount::default(), &total, 10.0), None);
+        assert_eq!(eta(&done, &total, 1.0), None);
+        assert_eq!(eta(&Amount::points(4), &total, 10.0), None);
+        // One region of sixteen says nothing of the others, four of them do, and one of two does.
+        let of = |done, total| eta(&Amount::items(done), &Amount::items(total), 30.0);
+        assert_eq!(
+            [of(1, 16), of(3, 9), of(4, 16), of(1, 2)],
+            [None, None, Some(90.0), Some(30.0)]
+        );
         assert_eq!(short(35_200_000.0), "35.2 M");
         let amounts = [Amount::items(1), Amount::items(4)];
         let fit = begun(&amounts);
-        assert_eq!(words(&fit), "25 %, 1 item, 17 of 60 pieces known so far, 27 s to go");
+        assert_eq!(words(&fit), "25 %, 1 item, 17 of 60 pieces known so far, 9 s so far");
         let over = StageState { pieces: [60, 60], is_over: true, ..fit };
         assert_eq!(words(&over), "25 %, 1 item, done in 9.0 s");
+        let amounts = [Amount::items(5), Amount::items(20)];
+        assert_eq!(
+            words(&begun(&amounts)),
+            "25 %, 5 items, 17 of 60 pieces known so far, 27 s to go"
+        );
     }
 
     #[test]
@@ -204,7 +234,7 @@ mod tests {
         );
         assert_eq!(
             bar_line("fit", &StageState { pieces: [0; 2], ..state }, None, 9.0),
-            "finding robots [====>           ] about 27 s to go, 1 of 4 items, 9 s so far"
+            "finding robots [====>           ] 1 of 4 items, 9 s so far"
         );
         let (done, total) = (Amount::points(2_500_000), Amount::points(10_000_000));
         let points = StageState { done: &done, total: &total, pieces: [0; 2], ..state };

@@ -179,6 +179,13 @@ impl Canvas {
         self.pixels.draw_pixmap(at[0], at[1], from, &paint, Transform::identity(), None);
     }
 
+    /// The colour of a pixel.
+    #[cfg(test)]
+    pub(crate) fn at(&self, x: usize, y: usize) -> Rgb {
+        let p = self.pixels.pixels()[y * self.width() + x];
+        [p.red(), p.green(), p.blue()]
+    }
+
     /// Writes a PNG file.
     ///
     /// # Errors
@@ -220,8 +227,7 @@ mod tests {
     use super::*;
 
     fn at(canvas: &Canvas, x: usize, y: usize) -> Rgb {
-        let p = canvas.pixels.pixels()[y * canvas.width() + x];
-        [p.red(), p.green(), p.blue()]
+        canvas.at(x, y)
     }
 
     #[test]

@@ -43,6 +43,7 @@ mod mask;
 mod npy;
 mod octomap;
 mod pack;
+mod picture_names;
 mod picture_pixels;
 mod places;
 mod plan_picture;

@@ -2,6 +2,7 @@
 
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, robot_color};
 use crate::font::TextSize::{Body, Title};
+use crate::picture_names::PictureNames;
 use contract::{Label, PointKind};
 use geometry::Aabb;
 use std::collections::BTreeSet;
@@ -153,17 +154,22 @@ impl PlanPicture {
             canvas.ring([x, y], radius, colour, [MARGIN, 2 * MARGIN, MARGIN + w, 2 * MARGIN + h]);
             self.outline(&mut canvas, zoom, &robot.body, blend(colour, INK, 0.6));
         }
-        for (name, at) in scanners {
-            let (x, y) = place(at);
+        let dots: Vec<_> = scanners.iter().map(|(_, at)| (place(at), SCANNER)).collect();
+        let own = robots.iter().enumerate().map(|(i, robot)| (place(&robot.at), robot_color(i)));
+        let dots: Vec<_> = dots.into_iter().chain(own).collect();
+        let bounds = [MARGIN, 2 * MARGIN, MARGIN + w, 2 * MARGIN + h];
+        let mut names = PictureNames::new(bounds);
+        for &((x, y), colour) in &dots {
             canvas.disc(x, y, 5, WHITE);
-            canvas.disc(x, y, 4, [200, 0, 60]);
-            canvas.text(x + 8, y - 4, Body, [160, 0, 50], name);
+            canvas.disc(x, y, 4, colour);
+            names.keep_free([x - 5, y - 5, x + 6, y + 6]);
         }
-        for (i, PlanRobot { name, at, .. }) in robots.iter().enumerate() {
-            let (x, y) = place(at);
-            canvas.disc(x, y, 5, WHITE);
-            canvas.disc(x, y, 4, robot_color(i));
-            canvas.text(x + 8, y - 8, Title, robot_color(i), name);
+        let (scanner_dots, robot_dots) = dots.split_at(scanners.len());
+        for (robot, &((x, y), colour)) in robots.iter().zip(robot_dots) {
+            names.write(&mut canvas, [x, y], Title, colour, &robot.name);
+        }
+        for ((name, _), &((x, y), _)) in scanners.iter().zip(scanner_dots) {
+            names.write(&mut canvas, [x, y], Body, [160, 0, 50], name);
         }
         canvas.text(MARGIN, MARGIN / 2, Title, INK, title);
         self.scale_bar(&mut canvas, zoom, 2 * MARGIN + h + 32);
@@ -219,12 +225,8 @@ impl PlanPicture {
         let pixels = (metres / self.cell * zoom as f64) as i64;
         canvas.fill(MARGIN, y, pixels, 3, INK);
         canvas.text(MARGIN, y + 8, Body, INK, &format!("{metres} m"));
-        let legend = [
-            ("floor", FLOOR),
-            ("fixed", FIXED),
-            ("uncertain", UNCERTAIN),
-            ("scanner", [200, 0, 60]),
-        ];
+        let legend =
+            [("floor", FLOOR), ("fixed", FIXED), ("uncertain", UNCERTAIN), ("scanner", SCANNER)];
         let reach = "circles: reach, lines: outlines of robots; grid in metres";
         canvas.text(MARGIN, y + 26, Body, INK, reach);
         if self.top.is_finite() {
@@ -265,6 +267,7 @@ const LINE_SHARE: f64 = 0.25;
 const FLOOR: Rgb = [232, 234, 230];
 const FIXED: Rgb = [120, 126, 134];
 const UNCERTAIN: Rgb = [236, 190, 60];
+const SCANNER: Rgb = [200, 0, 60];
 
 impl PlanCell {
     fn n_standing(&self) -> u32 {

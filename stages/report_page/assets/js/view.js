@@ -238,25 +238,28 @@ class View {
         () => [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + 0.1],
         thing.now ? LOOKS.came : LOOKS.gone);
     });
+    for (const label of this.labels) label.half = label.node.offsetWidth / 2;
   }
 
   /** Labels, axes and scale over the picture. */
   overlay(camera) {
     const { clientWidth: w, clientHeight: h } = this.canvas;
     const taken = [];
-    for (const { node, at, look, robot } of this.labels) {
+    const buttons = { left: $("tools").offsetLeft, bottom: $("tools").offsetTop + $("tools").offsetHeight };
+    for (const { node, at, look, robot, half } of this.labels) {
       const p = at();
       const c = [0, 1, 3].map((r) => camera.clip[r] * p[0] + camera.clip[4 + r] * p[1]
         + camera.clip[8 + r] * p[2] + camera.clip[12 + r]);
-      const [x, y] = [(c[0] / c[2] + 1) / 2 * w, (1 - c[1] / c[2]) / 2 * h];
-      const half = 4 * node.textContent.length + 8;
-      const isFree = c[2] > NEAREST && x > 0 && y > 0 && x < w && y < h
-        && !taken.some(([a, b, r]) => Math.abs(a - x) < r + half && Math.abs(b - y) < 20);
+      const [u, y] = [(c[0] / c[2] + 1) / 2 * w, (1 - c[1] / c[2]) / 2 * h];
+      const x = clamp(u, half, w - half);
+      const isFree = c[2] > NEAREST && u > 0 && y > 12 && u < w && y < h - 12
+        && (x + half < buttons.left || y - 14 > buttons.bottom)
+        && !taken.some(([a, b, r]) => Math.abs(a - x) < r + half + 2 && Math.abs(b - y) < 24);
       const isOn = this.withLabels !== false && (!look || look.on) && isFree;
       node.style.display = isOn ? "" : "none";
       if (!isOn) continue;
       taken.push([x, y, half]);
-      node.style.transform = `translate(${Math.round(x - half)}px, ${Math.round(y - 10)}px)`;
+      node.style.transform = `translate(${Math.round(x - half)}px, ${Math.round(y - 11)}px)`;
       if (robot) node.classList.toggle("chosen", robot === this.chosen);
     }
     this.axes(camera);
