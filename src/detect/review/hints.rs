@@ -47,7 +47,7 @@ impl Review {
         let known =
             open.iter().map(|(k, fit)| (*k, hint(&self.places[*k], fit.model, posture(fit))));
         let hints: Vec<(usize, RobotHint)> = unknown.into_iter().chain(known).collect();
-        let task = Task::new("review").large();
+        let task = Task::new("hints").large();
         let found =
             engine.fan_out(task, hints.iter().collect(), |(_, hint)| search.hinted(hint))?;
         for ((k, hint), found) in hints.iter().zip(found) {
