@@ -77,6 +77,7 @@ impl<'a> ReportedResult<'a> {
             self.engine.cancel.check()?;
             page.add_robot(self.robot(entry, &loops)?);
         }
+        self.add_pictures(&mut page)?;
         let mut points = page.points();
         self.add_points(&mut points)?;
         self.add_spaces(&mut points)?;
@@ -159,6 +160,19 @@ impl<'a> ReportedResult<'a> {
         let number = self.result.robots.iter().position(|own| own.id == entry.id);
         let loops = number.and_then(|at| loops.get(&at)).cloned().unwrap_or_default();
         Ok(Some(PageRobot { model, world_from_link, loops, bodies, hanging }))
+    }
+
+    /// Adds the pictures of residuals, first those of robots that a person should look at.
+    fn add_pictures(&self, page: &mut ReportPage) -> Result<()> {
+        let mut robots: Vec<&RobotEntry> = self.result.robots.iter().collect();
+        robots.sort_by_key(|robot| robot.verdict == Verdict::Trusted.word());
+        for robot in robots {
+            let name = format!("pictures/{}_evidence.png", robot.id);
+            if self.files.has(&name) {
+                page.add_picture(&robot.id, self.files.bytes(&name)?);
+            }
+        }
+        Ok(())
     }
 
     /// Reads all tiles, one after the other.

@@ -2,13 +2,14 @@
 //! a policy that allows nothing else.
 
 use crate::blocks::{COARSEST, Owner, PagePoints};
-use crate::encode::{packed, policy_digest, push_varint};
+use crate::encode::{base64, packed, policy_digest, push_varint};
 use crate::input::{PageRobot, PageScanner, PageTexts};
 use crate::meshes::{MeshEntry, MeshStore};
 use crate::texts::{embedded, filled};
 use crate::trees::TreeEntry;
 use contract::{Error, Kind, Result, quote};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
 const STYLE: &str = include_str!("../assets/page.css");
@@ -32,6 +33,9 @@ pub const PAGE_SCHEMA: &str = "stillpoint.page/1";
 pub const MOST_POINTS: usize = 3_200_000;
 /// Most bytes of points and meshes as text; texts of the result come on top.
 const MOST_PACKED: usize = 12_000_000;
+/// Most bytes of data, points, meshes and pictures as text: with script and style the page stays
+/// below 15 MB. Pictures that do not fit are left out, and the page refers to their files.
+const MOST_TEXT: usize = 14_600_000;
 
 /// A page that is being made: first robots, then points.
 #[derive(Debug)]
@@ -42,6 +46,8 @@ pub struct ReportPage {
     trees: Vec<TreeEntry>,
     meshes: MeshStore,
     bounds: Vec<geometry::Aabb>,
+    /// PNG files by the identity of their robot.
+    pictures: Vec<(String, Vec<u8>)>,
 }
 
 /// Where the body of a robot is found on the page.
@@ -89,7 +95,8 @@ impl ReportPage {
     #[must_use]
     pub fn new(texts: PageTexts, scanners: Vec<PageScanner>) -> Self {
         let (robots, trees, bounds) = (Vec::new(), Vec::new(), Vec::new());
-        Self { texts, scanners, robots, trees, meshes: MeshStore::default(), bounds }
+        let (meshes, pictures) = (MeshStore::default(), Vec::new());
+        Self { texts, scanners, robots, trees, meshes, bounds, pictures }
     }
 
     /// Adds the next robot of the result; `None` for one without a body on the page.
@@ -107,6 +114,11 @@ impl ReportPage {
             RobotOnPage { tree, mesh, hanging }
         });
         self.robots.push(on_page);
+    }
+
+    /// Adds the picture of a robot's residuals, a PNG file. Where not all fit, those added first do.
+    pub fn add_picture(&mut self, id: &str, png: Vec<u8>) {
+        self.pictures.push((id.into(), png));
     }
 
     /// Room for the points of the page, once all robots are there.
@@ -163,6 +175,8 @@ impl ReportPage {
             most = (most.min(points.n_points()) as f64 * 0.95 * MOST_PACKED as f64
                 / packed.len() as f64) as usize;
         };
+        let pictures =
+            self.pictures(MOST_TEXT.saturating_sub(data.len() + view.len() + packed.len()));
         let script = format!("(() => {{\n\"use strict\";\n{}}})();\n", SCRIPTS.join("\n"));
         let policy = format!(
             "default-src 'none'; script-src {}; style-src {}; img-src data: blob:; \
@@ -180,9 +194,22 @@ impl ReportPage {
                 ("script", &script),
                 ("data", &data),
                 ("view", &view),
+                ("pictures", &embedded(&json(&pictures)?, "the pictures")?),
                 ("packed", &packed),
             ],
         ))
+    }
+
+    /// As many pictures as so many bytes of text hold, the first ones.
+    fn pictures(&self, most: usize) -> BTreeMap<&str, String> {
+        let mut room = most;
+        let fits = |(_, png): &&(String, Vec<u8>)| {
+            let takes = png.len().div_ceil(3) * 4;
+            let fits = takes <= room;
+            room -= if fits { takes } else { 0 };
+            fits
+        };
+        self.pictures.iter().filter(fits).map(|(id, png)| (&**id, base64(png))).collect()
     }
 
     /// The view's data as JSON, and points and meshes as text.

@@ -3,6 +3,8 @@
 const $ = (id) => document.getElementById(id);
 const data = JSON.parse($("data").textContent);
 const view = JSON.parse($("view-data").textContent);
+/** PNG files as base64, by robot: of those that fit on the page. */
+const pictures = JSON.parse($("pictures").textContent);
 const result = data.result;
 const changes = data.changes;
 

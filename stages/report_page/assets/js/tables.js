@@ -105,6 +105,7 @@ function robotDetails(scene, robot) {
 function robotBody(scene, robot) {
   const { entry } = robot;
   const sigma = entry.base_sigma;
+  const picture = pictures[entry.id];
   const lines = [
     ["Verdict", [badge(entry.verdict), " ", { trusted: "right as far as the points can tell",
       doubtful: "may be right: a person should look at it",
@@ -127,8 +128,8 @@ function robotBody(scene, robot) {
       : null],
     ["Space within reach", entry.space ? `${fixed(entry.space.free_m3, 1)} m³ free, ${
       fixed(entry.space.unknown_m3, 1)} m³ unseen` : "not computed"],
-    ["Files", robot.body ? [el("code", {}, `robots/${entry.id}/robot.urdf`), ", ",
-      el("a", { href: `pictures/${entry.id}_evidence.png` }, "residuals in colour, by views")] : null],
+    ["Files", robot.body ? [el("code", {}, `robots/${entry.id}/robot.urdf`), ...(picture ? [] : [", ",
+      el("a", { href: `pictures/${entry.id}_evidence.png` }, "residuals in colour, by views")])] : null],
   ];
   const why = entry.reasons?.length
     ? [el("h4", {}, entry.verdict === "trusted" ? "Notes" : "Why"),
@@ -137,6 +138,10 @@ function robotBody(scene, robot) {
   return [
     el("div", { class: "cols" }, el("div", {}, pairs(lines)), el("div", {}, why, review(entry))),
     el("h4", {}, "Joints"), jointTable(robot),
+    picture ? el("details", { class: "residuals" },
+      el("summary", {}, "Residuals in colour, by views"),
+      el("img", { src: `data:image/png;base64,${picture}`, alt: `${entry.id} from several sides, its points`
+        + " in the colours of their distances from its surface. The table of links has numbers." })) : [],
     ...(entry.stays || []).map((stay) => [el("h4", {}, `In scans ${stay.stands_in.join(", ")}: ${
       stay.verdict}`), jointTable({ ...robot, entry: { ...entry, ...stay } })]).flat(),
     el("h4", {}, "Evidence by link"),
@@ -146,7 +151,7 @@ function robotBody(scene, robot) {
         cell(percent(e.seen), "num"), cell(percent(e.matched), "num"),
         cell(percent(e.violated), "num"), cell(many(e.n_points), "num"),
         cell(e.n_points ? millimetres(e.rms) : "", "num")))),
-  ];
+  ].flat();
 }
 
 /** A rotation as its angle about the vertical, and how far it leans. */

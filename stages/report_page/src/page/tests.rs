@@ -67,7 +67,7 @@ fn no_name_gets_out_of_its_place() {
     for bad in ["<img src", "onerror=alert(1)>", "\u{202e}", "<!--"] {
         assert!(!html.contains(bad), "{bad}");
     }
-    assert_eq!(html.matches("</script>").count(), 4, "its own four");
+    assert_eq!(html.matches("</script>").count(), 5, "its own five");
     let data: serde_json::Value = serde_json::from_str(element(&html, "data")).expect("JSON");
     assert_eq!(data["result"]["robots"][0]["id"], NASTY);
     assert_eq!(data["result"]["robots"][0]["joints"][NASTY], 1.5);
@@ -181,4 +181,17 @@ fn unbase64(text: &str) -> Vec<u8> {
         out.extend(&bits.to_be_bytes()[1..four.len()]);
     }
     out
+}
+
+#[test]
+fn pictures_stand_on_the_page_as_far_as_they_fit() {
+    let mut own = page("R1");
+    own.add_picture("R1", b"first".to_vec());
+    own.add_picture("R2", vec![7; MOST_TEXT]);
+    own.add_picture("R3", b"third".to_vec());
+    let html = own.html(&own.points()).expect("a page");
+    let known: serde_json::Value =
+        serde_json::from_str(element(&html, "pictures")).expect("parses");
+    // "R2" does not fit: the page refers to its file.
+    assert_eq!(known, serde_json::json!({"R1": base64(b"first"), "R3": base64(b"third")}));
 }
