@@ -17,7 +17,7 @@ use export::{
 };
 use geometry::Aabb;
 use ingest::{MISPLACED, Sources};
-use robot::{JointKind, Library, Model, Motion, Role};
+use robot::{JointKind, Library, Model, Motion};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
@@ -303,9 +303,10 @@ pub(crate) fn input_entry(
     }
 }
 
-/// The last link of the main chain.
+/// The last link of the main chain. Frames of the base, which URDF files may state after it, belong
+/// to the main chain's root.
 fn tip(model: &Model) -> Option<usize> {
-    (0..model.links.len()).rev().find(|&l| model.links[l].role == Role::Main)
+    model.main_chain.last().map(|&joint| model.joints[joint].child)
 }
 
 fn format_word(format: Format) -> &'static str {
@@ -326,6 +327,24 @@ fn format_word(format: Format) -> &'static str {
 mod tests {
     use super::*;
     use contract::Certainty;
+
+    #[test]
+    fn the_tip_is_at_the_end_of_the_arm_though_a_frame_of_the_base_stands_behind_it() {
+        let urdf = "<robot name='arm'><link name='foot'/><link name='hand'/><link name='tool0'/>
+            <link name='base'/>
+            <joint name='turn' type='revolute'><parent link='foot'/><child link='hand'/>
+              <limit lower='-1' upper='1' effort='1' velocity='1'/></joint>
+            <joint name='hold' type='fixed'><parent link='hand'/><child link='tool0'/></joint>
+            <joint name='stand' type='fixed'><parent link='foot'/><child link='base'/></joint>
+            </robot>";
+        let dir = tempfile::tempdir().expect("a folder");
+        let path = dir.path().join("arm.urdf");
+        std::fs::write(&path, urdf).expect("is written");
+        let (model, _) =
+            Model::load_urdf(&path, "arm", &robot::Settings::default()).expect("loads");
+        // Poses were stated of the frame at the base: its place is the base's, not the tip's.
+        assert_eq!(tip(&model).map(|l| &*model.links[l].name), Some("tool0"));
+    }
 
     #[test]
     fn a_joint_has_its_deviation_always_and_the_word_that_fits_it() {
