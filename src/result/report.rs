@@ -330,7 +330,8 @@ mod tests {
 
     #[test]
     fn the_tip_is_at_the_end_of_the_arm_though_a_frame_of_the_base_stands_behind_it() {
-        let urdf = "<robot name='arm'><link name='foot'/><link name='hand'/><link name='tool0'/>
+        let urdf = "<robot name='arm'><link name='foot'/><link name='hand'><visual><geometry>
+              <box size='0.2 0.2 0.2'/></geometry></visual></link><link name='tool0'/>
             <link name='base'/>
             <joint name='turn' type='revolute'><parent link='foot'/><child link='hand'/>
               <limit lower='-1' upper='1' effort='1' velocity='1'/></joint>

@@ -6,7 +6,7 @@ use contract::{Fan, InstallationPlane};
 use geometry::{Plane, Pose, Vector};
 
 use crate::problem::BaseSearch;
-use crate::score_grid::{MAX_STRIDE, ShiftRow, Stencil};
+use crate::score_grid::{MAX_STRIDE, PlaceRow, Stencil};
 use crate::trial::{BaseTrial, SampleScore, Samples, coarse_yaw};
 
 /// Heights above a plane of the points that may belong to a base, metres: above the plane itself,
@@ -69,7 +69,7 @@ impl<'s> TurnedBases<'s> {
         &self,
         k: usize,
         places: &[Place],
-        row: Option<&ShiftRow>,
+        row: Option<&PlaceRow>,
         n_samples: usize,
     ) -> Vec<SampleScore> {
         let known = self.stencils.as_ref().zip(row);
@@ -78,7 +78,7 @@ impl<'s> TurnedBases<'s> {
     }
 
     /// The row of cells in which the first of these places lie, as many as do.
-    fn row(&self, places: &[Place]) -> Option<ShiftRow> {
+    fn row(&self, places: &[Place]) -> Option<PlaceRow> {
         let stencil = self.stencils.as_ref()?.first()?;
         let cells = |p: &Place| stencil.cells(self.shift(*p).cast::<f32>().into());
         let first = cells(places.first()?);
@@ -89,11 +89,11 @@ impl<'s> TurnedBases<'s> {
             true => places.iter().enumerate().take_while(fits).count(),
             false => 1,
         };
-        Some(ShiftRow { first, stride: stride.clamp(1, MAX_STRIDE), n })
+        Some(PlaceRow { first, stride: stride.clamp(1, MAX_STRIDE), n })
     }
 
     /// The trials worth a closer look at some places in a row, on plane `at`.
-    fn trials(&self, at: usize, places: &[Place], row: Option<&ShiftRow>) -> Vec<BaseTrial> {
+    fn trials(&self, at: usize, places: &[Place], row: Option<&PlaceRow>) -> Vec<BaseTrial> {
         let (search, n) = (self.search, self.poses.len());
         let (n_all, thrift) = (search.settings.n_coarse, search.thrift);
         // Few samples at every other yaw exclude most places, and most yaws of the others.
@@ -137,7 +137,7 @@ impl BaseSearch<'_> {
         let places = self.occupied(plane, local, self.coarse_step());
         let Some(start) = places.first() else { return Vec::new() };
         let turned = TurnedBases::new(self, local, *start);
-        let mut rows: Vec<(&[Place], Option<ShiftRow>)> = Vec::new();
+        let mut rows: Vec<(&[Place], Option<PlaceRow>)> = Vec::new();
         let mut rest = &places[..];
         while !rest.is_empty() {
             let row = turned.row(rest);
@@ -146,7 +146,7 @@ impl BaseSearch<'_> {
             rest = others;
         }
         let trials =
-            |(places, row): (&[Place], Option<ShiftRow>)| turned.trials(at, places, row.as_ref());
+            |(places, row): (&[Place], Option<PlaceRow>)| turned.trials(at, places, row.as_ref());
         fan.fan(rows, trials).into_iter().flatten().collect()
     }
 

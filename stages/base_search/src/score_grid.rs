@@ -32,7 +32,7 @@ pub(crate) type StridedScores = [OnceLock<Vec<i8>>; 2];
 
 /// Places along x that a body is shifted to, at equal distances.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ShiftRow {
+pub(crate) struct PlaceRow {
     /// Shift to the first of them, cells.
     pub(crate) first: [i32; 3],
     /// Distance of neighbours, cells: 1 to [`MAX_STRIDE`].
@@ -40,7 +40,7 @@ pub(crate) struct ShiftRow {
     pub(crate) n: usize,
 }
 
-impl ShiftRow {
+impl PlaceRow {
     /// Some of its places.
     pub(crate) fn part(&self, at: usize, n: usize) -> Self {
         let [x, y, z] = self.first;
@@ -153,7 +153,7 @@ impl Stencil<'_> {
 
     /// Scores of the first `n` samples at each place of a row; `None` if a sample would lie outside
     /// of the grid. Sample by sample, since the cells of neighbouring places lie side by side.
-    pub(crate) fn look_up_row(&self, row: &ShiftRow, n: usize) -> Option<Vec<SampleScore>> {
+    pub(crate) fn look_up_row(&self, row: &PlaceRow, n: usize) -> Option<Vec<SampleScore>> {
         let last = row.first[0] + row.stride * (row.n as i32 - 1);
         let ends = [row.first, [last, row.first[1], row.first[2]]];
         if !ends.into_iter().all(|by| self.is_inside(by)) {
@@ -224,13 +224,13 @@ mod tests {
         }
         assert_eq!(stencil.look_up([1.0, 0.0, 0.0], 3), None);
         for (stride, first, n) in [(1, [-2, 3, 1], 9), (2, [-3, -1, 0], 6), (3, [0, 2, -1], 3)] {
-            let row = ShiftRow { first, stride, n };
+            let row = PlaceRow { first, stride, n };
             let by = |at: usize| [first[0] + stride * at as i32, first[1], first[2]];
             let metres = |at: usize| by(at).map(|v| v as f32 * 0.03);
             let each = (0..n).map(|at| stencil.look_up(metres(at), 3)).collect::<Option<Vec<_>>>();
             assert!(each.is_some(), "{row:?}");
             assert_eq!(stencil.look_up_row(&row, 3), each, "{row:?}");
-            assert_eq!(stencil.look_up_row(&ShiftRow { n: 20, ..row }, 3), None);
+            assert_eq!(stencil.look_up_row(&PlaceRow { n: 20, ..row }, 3), None);
         }
         let outside = grid.look_up(&points, &at(9.0, 0.0, 0.0)).score;
         assert!((outside + f64::from(HIDDEN)).abs() < 1e-6, "{outside}");

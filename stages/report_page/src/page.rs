@@ -116,7 +116,8 @@ impl ReportPage {
         self.robots.push(on_page);
     }
 
-    /// Adds the picture of a robot's residuals, a PNG file. Where not all fit, those added first do.
+    /// Adds the picture of a robot's residuals, a PNG file. Where not all fit, those added first
+    /// do.
     pub fn add_picture(&mut self, id: &str, png: Vec<u8>) {
         self.pictures.push((id.into(), png));
     }
