@@ -4,7 +4,7 @@
 //! surface behind, so that a curtain of such points hangs behind every outline. Those of a robot
 //! move with it, and nothing is where they are.
 
-use geometry::{Point, Pose};
+use geometry::{Point, Pose, Vector};
 use robot::Model;
 use rustc_hash::FxHashMap;
 
@@ -61,22 +61,38 @@ impl Shadow {
         let (direction, rim) = (off / far, (GRAZE + 0.5 * SPACING) / far);
         let n = (rim / self.width).ceil() as i32;
         let middle = self.cell(direction.into());
-        let side = 2 * n + 1;
-        for i in 0..side.pow(3) {
-            let by = [i % side - n, i / side % side - n, i / (side * side) - n];
-            let cell: [i32; 3] = std::array::from_fn(|k| middle[k] + by[k]);
-            let at = cell.map(|c| (f64::from(c) + 0.5) * self.width);
-            let length = at.iter().map(|v| v * v).sum::<f64>().sqrt();
-            // Only cells that the unit sphere intersects are directions.
-            if (length - 1.0).abs() > self.width {
-                continue;
+        let width = self.width;
+        let along = |k: usize| {
+            (middle[k] - n..=middle[k] + n).map(move |cell| (cell, (f64::from(cell) + 0.5) * width))
+        };
+        // Squares exclude most cells without a root; beside their rounding the lengths decide.
+        let [low, high] =
+            [1.0 - self.width, 1.0 + self.width].map(|length| length.max(0.0).powi(2));
+        let may_cross = low - 1e-9..=high + 1e-9;
+        for (i, x) in along(0) {
+            for (j, y) in along(1) {
+                let flat = x * x + y * y;
+                let near = along(2).filter(|(_, z)| may_cross.contains(&(flat + z * z)));
+                for (k, z) in near {
+                    self.mark([i, j, k], [x, y, z], &direction, [far, rim]);
+                }
             }
-            let aside = (0..3).map(|k| (at[k] / length - direction[k]).powi(2)).sum::<f64>().sqrt();
-            if aside <= rim + self.width {
-                let distance = (far + ASIDE * far * aside) as f32;
-                let near = self.near.entry(cell).or_insert(distance);
-                *near = near.min(distance);
-            }
+        }
+    }
+
+    /// Marks the cell about `at` if it is a direction within the rim of a surface in this direction,
+    /// so far away.
+    fn mark(&mut self, cell: [i32; 3], at: [f64; 3], direction: &Vector, [far, rim]: [f64; 2]) {
+        let length = at.iter().map(|v| v * v).sum::<f64>().sqrt();
+        // Only cells that the unit sphere intersects are directions.
+        if (length - 1.0).abs() > self.width {
+            return;
+        }
+        let aside = (0..3).map(|k| (at[k] / length - direction[k]).powi(2)).sum::<f64>().sqrt();
+        if aside <= rim + self.width {
+            let distance = (far + ASIDE * far * aside) as f32;
+            let near = self.near.entry(cell).or_insert(distance);
+            *near = near.min(distance);
         }
     }
 
