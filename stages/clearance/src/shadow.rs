@@ -80,8 +80,8 @@ impl Shadow {
         }
     }
 
-    /// Marks the cell about `at` if it is a direction within the rim of a surface in this direction,
-    /// so far away.
+    /// Marks the cell about `at` if it is a direction within the rim of a surface in this
+    /// direction, so far away.
     fn mark(&mut self, cell: [i32; 3], at: [f64; 3], direction: &Vector, [far, rim]: [f64; 2]) {
         let length = at.iter().map(|v| v * v).sum::<f64>().sqrt();
         // Only cells that the unit sphere intersects are directions.
