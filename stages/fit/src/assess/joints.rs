@@ -49,6 +49,11 @@ impl OpenJoints {
         for rival in rivals {
             let other = &rival.other.hypothesis;
             let apart: Vec<bool> = (0..n).map(|j| h.turn(other, j) > MODES.other_turn).collect();
+            // Whatever else differs, a flange beside it, the base may stand there.
+            if rival.margin < MODES.equal {
+                let by = base_apart(h, other);
+                base = std::array::from_fn(|i| base[i].max(by[i]));
+            }
             // One joint alone, or the tail of the chain, can be open by symmetry; a flip further up
             // is another answer.
             let first = apart.iter().position(|a| *a).unwrap_or(n);
@@ -60,8 +65,6 @@ impl OpenJoints {
                     is_open[j] = true;
                     spread[j] = spread[j].max(h.turn(other, j));
                 }
-                let apart = base_apart(h, other);
-                base = std::array::from_fn(|i| base[i].max(apart[i]));
             }
         }
         Self { is_open, spread, base }
@@ -237,6 +240,10 @@ mod tests {
             assert!(is_open && (sigma[3] - FRAC_PI_2).abs() < 1e-9, "{sigma:?}");
             assert_eq!([sigma[0], sigma[4], sigma[5]], [1e-4; 3]);
             assert_eq!(base_sigma(&quarter, 0.5), (false, [1e-4; 6]));
+            // The same where what it carries differs, too.
+            let mut both = quarter.clone();
+            both.hypothesis.posture[1] = 0.5;
+            assert!((base_sigma(&both, 0.0).1[3] - FRAC_PI_2).abs() < 1e-9);
             // A flange that may stand otherwise says nothing of the base.
             let flange = about(Pose::identity(), 1.0);
             assert_eq!(base_sigma(&flange, 0.0), (true, [1e-4; 6]));
