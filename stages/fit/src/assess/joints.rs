@@ -55,13 +55,18 @@ impl OpenJoints {
                 base = std::array::from_fn(|i| base[i].max(by[i]));
             }
             // One joint alone, or the tail of the chain, can be open by symmetry; a flip further up
-            // is another answer.
-            let first = apart.iter().position(|a| *a).unwrap_or(n);
-            let is_alone = apart.iter().filter(|a| **a).count() == 1;
-            let is_slide = is_alone && closes_tool(problem, first);
+            // is another answer. What a last joint may be beside the rest is asked of it alone: it
+            // does not count beside another, whose rivals have any value of it.
+            let leaf = &problem.prepared.leaf;
+            let all: Vec<usize> = (0..n).filter(|&j| apart[j]).collect();
+            let arm: Vec<usize> = all.iter().copied().filter(|&j| !leaf[j]).collect();
+            let counted = if arm.is_empty() { &all } else { &arm };
+            let is_alone = counted.len() == 1;
+            let is_slide = is_alone && closes_tool(problem, counted[0]);
             let is_equal = rival.margin < if is_slide { MODES.slide_equal } else { MODES.equal };
-            if is_equal && (is_alone || (first..n).all(|j| is_open[j] || j + 1 == n)) {
-                for j in (0..n).filter(|&j| apart[j]) {
+            let is_tail = all.first().is_some_and(|&j| (j..n).all(|j| is_open[j] || j + 1 == n));
+            if is_equal && (is_alone || is_tail) {
+                for &j in if is_tail { &all } else { counted } {
                     is_open[j] = true;
                     spread[j] = spread[j].max(h.turn(other, j));
                 }
@@ -243,7 +248,8 @@ mod tests {
             // The same where what it carries differs, too.
             let mut both = quarter.clone();
             both.hypothesis.posture[1] = 0.5;
-            assert!((base_sigma(&both, 0.0).1[3] - FRAC_PI_2).abs() < 1e-9);
+            let (is_open, sigma) = base_sigma(&both, 0.0);
+            assert!(is_open && (sigma[3] - FRAC_PI_2).abs() < 1e-9, "{sigma:?}");
             // A flange that may stand otherwise says nothing of the base.
             let flange = about(Pose::identity(), 1.0);
             assert_eq!(base_sigma(&flange, 0.0), (true, [1e-4; 6]));
