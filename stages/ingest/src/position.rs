@@ -181,34 +181,58 @@ mod tests {
     /// What a scanner at the origin sees of a room with a pillar and a wire fence, 0.3° apart, as
     /// seen from elsewhere.
     fn room(from: [f64; 3]) -> Vec<[f32; 3]> {
-        let mut out = Vec::new();
-        for row in -200..200 {
-            for col in 0..1200 {
-                let (elevation, azimuth) =
-                    (f64::from(row) * 0.3_f64.to_radians(), f64::from(col) * 0.3_f64.to_radians());
-                let flat = elevation.cos();
-                let to = [flat * azimuth.cos(), flat * azimuth.sin(), elevation.sin()];
-                // Walls, floor and ceiling.
-                let wall = |axis: usize, at: [f64; 2]| {
-                    let at = if to[axis] < 0.0 { at[0] } else { at[1] };
-                    if to[axis] == 0.0 { f64::INFINITY } else { at / to[axis] }
-                };
-                let far = wall(0, [-4.0, 6.0]).min(wall(1, [-5.0, 4.0])).min(wall(2, [-1.6, 3.0]));
-                // Boxes of 0.8 m at 2.5 m in four directions, up to 2 m.
-                let is_box = (azimuth.to_degrees() % 90.0 - 40.0).abs() < 9.0;
-                let near = 2.5 / flat;
-                let is_low = near * to[2] < 0.4;
-                // A fence at 2 m: every fifth beam meets a wire.
-                let is_fence = (100..300).contains(&col) && (row * 7 + col) % 5 == 0;
-                let range = match (is_fence, is_box && is_low) {
-                    (true, _) => far.min(2.0 / flat),
-                    (_, true) => far.min(near),
-                    _ => far,
-                };
-                out.push([0, 1, 2].map(|a| (range * to[a] - from[a]) as f32));
-            }
-        }
-        out
+        let beams = (-200..200).flat_map(|row| (0..1200).map(move |column| (row, column)));
+        let seen = beams.map(|(row, column)| {
+            // A fence at 2 m: every fifth beam meets a wire.
+            let is_fence = (100..300).contains(&column) && (row * 7 + column) % 5 == 0;
+            let to = [row, column].map(|n| f64::from(n) * 0.3);
+            met(to, is_fence, from)
+        });
+        seen.collect()
+    }
+
+    /// Where a beam of this elevation and azimuth, degrees, ends in the room, as seen from a place.
+    fn met([elevation, azimuth]: [f64; 2], is_fence: bool, from: [f64; 3]) -> [f32; 3] {
+        let (elevation, azimuth) = (elevation.to_radians(), azimuth.to_radians());
+        let flat = elevation.cos();
+        let to = [flat * azimuth.cos(), flat * azimuth.sin(), elevation.sin()];
+        // Walls, floor and ceiling.
+        let wall = |axis: usize, at: [f64; 2]| {
+            let at = if to[axis] < 0.0 { at[0] } else { at[1] };
+            if to[axis] == 0.0 { f64::INFINITY } else { at / to[axis] }
+        };
+        let far = wall(0, [-4.0, 6.0]).min(wall(1, [-5.0, 4.0])).min(wall(2, [-1.6, 3.0]));
+        // Boxes of 0.8 m at 2.5 m in four directions, up to 2 m.
+        let is_box = (azimuth.to_degrees() % 90.0 - 40.0).abs() < 9.0;
+        let near = 2.5 / flat;
+        let is_low = near * to[2] < 0.4;
+        let range = match (is_fence, is_box && is_low) {
+            (true, _) => far.min(2.0 / flat),
+            (_, true) => far.min(near),
+            _ => far,
+        };
+        [0, 1, 2].map(|a| (range * to[a] - from[a]) as f32)
+    }
+
+    /// A scan of more points than are read, column by column, with a fence all around that half of
+    /// the beams meet.
+    #[test]
+    fn a_large_scan_behind_a_fence_is_not_refused_at_its_true_position() {
+        let (n_rows, n_columns) = (1_600_u64, 4_500_u64);
+        let n = n_rows * n_columns;
+        let run = |first: u64, length: usize| {
+            let point = |at: u64| {
+                let (row, column) = (at % n_rows, at / n_rows);
+                let to = [row as f64 * 0.08 - 64.0, column as f64 * 0.08];
+                // Wires as wide as their gaps, 5 cm.
+                let is_fence = (to[1] / 1.4).fract() < 0.5;
+                (at, met(to, is_fence, [0.0; 3]))
+            };
+            Ok((first..(first + length as u64).min(n)).map(point).collect())
+        };
+        let points = crate::sampling::spread((0, n - 1), N_POINTS, N_READ, run).expect("points");
+        let seen = look(&points);
+        assert!(points.len() > N_POINTS / 2 && !seen.is_wrong(), "{seen:?}");
     }
 
     #[test]

@@ -8,8 +8,10 @@ use contract::Result;
 const RUNS: [f64; 3] = [0.45, 0.1, 0.8];
 /// Number of further positions that are tried where points of other scans lie between.
 const MORE: usize = 16;
-/// Number of points of a spread that are read at once: a piece of most compressed files.
-const RUN: u64 = 50_000;
+/// Number of points of a spread that follow one another in the file: a sector of a few degrees or
+/// more. Many narrower sectors leave most cells of directions filled in part, and at true positions
+/// of ten scans of 10 million points up to 0.2 % of the full ones looked like two surfaces.
+const RUN: u64 = 500_000;
 
 /// Up to `n` points between the first and the last place of a scan, as runs of neighbours.
 /// `run` reads points of the scan, scan frame, among so many from a place on.
