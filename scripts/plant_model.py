@@ -15,6 +15,7 @@ What it leaves out: failures, the start of the engine, and that machines differ.
 import argparse
 import heapq
 import json
+import math
 
 #: Rates of src/estimate: points per second and core, seconds.
 INGEST, STORE, PLANES, NEAR, LABELS, JOIN, PAGE = 20e6, 30e6, 8e6, 60e6, 4e6, 20e6, 9e6
@@ -24,6 +25,8 @@ FILE, TILES, PIECE, RESULT = 17, 18, 73, 73
 #: Seconds of a shard before its own work: the program with a library of three models, and each input that is opened. Measured
 #: with `stillpoint shards` over 16 and 256 E57 files of one scan whose samples were known.
 START, OPEN = 0.06, 0.0075
+#: Points of a group of tiles, and the most groups, as src/label/joined_files.rs has them; seconds of the page and of files of robots.
+GROUP, GROUPS, GATHER = 20e6, 1024, 10.0
 
 
 def phases(plant):
@@ -39,14 +42,13 @@ def phases(plant):
         ("robots", [(start + CHOICE * regions + points / NEAR, 1e9, points * TILES / 10)]),
         ("spaces, labels", [(start + each / LABELS, 1, each * (FILE + PIECE))] * scans + [(start + SPACE, 1, each * TILES / 4)] * robots),
     ]
-    # Files of records are joined by all threads of one machine, but the cloud of fixed points is one file.
-    largest = 0 if plant.lean else points / JOIN / 2
-    joins = [(points / JOIN / 2, 1e9, points * (PIECE + RESULT)), (largest, 1, 0), (0 if plant.no_page else points / PAGE, 1, 0)]
-    if plant.spread_gather:
-        parts = 64 * 16
-        out.append(("gather", [(start + points / JOIN / parts, 1, points * (PIECE + RESULT) / parts)] * parts))
-    else:
-        out += [("gather", [join]) for join in joins if join[0]]
+    # Tiles in groups, with their points for the page; the cloud of fixed points is one file.
+    groups = min(GROUPS, math.ceil(points / GROUP))
+    tiles = points / JOIN / 2 + (0 if plant.no_page else points / PAGE)
+    bytes_of_file = points * (PIECE + RESULT) / (1 if plant.lean else 2)
+    files = [(start + tiles / groups, 1, bytes_of_file / groups)] * groups
+    out.append(("files", files if plant.lean else [*files, (start + points / JOIN / 2, 1, bytes_of_file)]))
+    out.append(("gather", [(start + GATHER, 1, 0)]))
     return out
 
 
@@ -89,7 +91,6 @@ def main():
     parser.add_argument("--disk", type=float, default=10e9, help="bandwidth of the shared disk, bytes per second")
     parser.add_argument("--lean", action="store_true", help="no cloud of fixed points")
     parser.add_argument("--no-page", action="store_true", help="no page of the result")
-    parser.add_argument("--spread-gather", action="store_true", help="as if files of the result were joined by shards of their own")
     parser.add_argument("--events", help="events of a measured job, in place of the plant")
     plant = parser.parse_args()
     work = measured(plant.events) if plant.events else phases(plant)

@@ -194,6 +194,12 @@ def result():
     return schema
 
 
+def shards():
+    schema = of_type("shards", "ShardList", "The list of the shards of a job (shards --json)", False)
+    schema["properties"]["schema"] = {"const": "stillpoint.shards/1"}
+    return schema
+
+
 def manifest():
     schema = of_type("manifest", "Manifest", "manifest.json: the list of a result's files", False)
     schema["properties"]["schema"] = {"const": "stillpoint.manifest/2"}
@@ -273,6 +279,7 @@ SCHEMAS = {
                                 "A --readings file of robots calibrate (TOML)", True),
     "robot": lambda: of_type("robot", "Sheet", "robot.toml of a model in a robot library", True),
     "scene": lambda: of_type("scene", "Scene", "A scene file of simulate (TOML)", True),
+    "shards": shards,
 }
 
 

@@ -12,8 +12,10 @@ use crate::detect::robots::{FittedRobots, KeptRobots, RobotList};
 use crate::detect::search::{PreparedLibrary, Search};
 use crate::detect::{library, tools};
 use crate::engine::{Engine, Task};
+use crate::estimate::sizes::all_points;
 use crate::estimate::{Estimate, course};
 use crate::job::{Job, Outcome, Settings, units};
+use crate::label::joined_files::{self, FileGroup};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{LabelFolders, Labelling, ScansToLabel, Scope, WrittenLabels};
 use crate::label::near_robots::NearRobots;
@@ -140,7 +142,9 @@ impl<'a> Run<'a> {
             left_out: failures.messages(job),
         };
         let mut outcome = report.finish(output)?;
-        outcome.notes = self.conclude(plant, robots.fits, &written, &outcome)?;
+        let parts = chosen.as_ref().map(|chosen| self.page_parts(chosen, sources));
+        outcome.notes =
+            self.conclude(plant, robots.fits, &written, &outcome, &parts.unwrap_or_default())?;
         output.prune(tiles, &[&ground_kept, &fits_kept], &models_kept);
         let n_kept = [models_kept.n_kept(), input_tiles.n_kept(), fits_kept.n_kept()];
         outcome.reused = cache::reused_in_words(["models", "tiles", "fits"], n_kept);
@@ -172,7 +176,9 @@ impl<'a> Run<'a> {
             let key = digests.tiles_key(i, &sources.scans, settings);
             key.is_some_and(|key| output.has_tiles(&key))
         };
-        Estimate::of(job, &sources, library.models.len(), has_tiles).checked(output.out())?;
+        let there = self.shards.map_or(0, |_| joined_files::bytes_there(&output.labels()));
+        let estimate = Estimate::of(job, &sources, library.models.len(), has_tiles);
+        estimate.with_written(there).checked(output.out())?;
         course::opened(job, &sources, library.models.len(), engine);
         Ok(Opened { library, review, sources })
     }
@@ -210,6 +216,27 @@ impl<'a> Run<'a> {
     pub(crate) fn label_folders(&self, chosen: &Cache, inputs: &[Input]) -> Vec<PathBuf> {
         let key = |input: &Input| Digests::labels_key(chosen.key(), input);
         inputs.iter().map(|input| self.output.labels().join(key(input).name())).collect()
+    }
+
+    /// The groups of files that are joined from the labels of all inputs, with their folders.
+    pub(crate) fn file_groups(
+        &self,
+        chosen: &Cache,
+        sources: &Sources,
+    ) -> Vec<(FileGroup, PathBuf)> {
+        let key = |group: &FileGroup| Digests::files_key(chosen.key(), group);
+        let folder = |group: &FileGroup| self.output.labels().join(key(group).name());
+        let groups = FileGroup::all(all_points(sources)).into_iter();
+        groups.map(|group| (group, folder(&group))).collect()
+    }
+
+    fn file_folders(&self, chosen: &Cache, sources: &Sources) -> Vec<PathBuf> {
+        self.file_groups(chosen, sources).into_iter().map(|(_, folder)| folder).collect()
+    }
+
+    /// Files with the points of the page that were kept when its tiles were joined.
+    fn page_parts(&self, chosen: &Cache, sources: &Sources) -> Vec<PathBuf> {
+        joined_files::kept_page_parts(&self.file_folders(chosen, sources))
     }
 
     /// Chooses compatible fits, adds tools, calibrates joints on request, estimates the
@@ -255,8 +282,9 @@ impl<'a> Run<'a> {
         let labelling = Labelling::new(robots, &scans, settings);
         let written = if let Some(chosen) = chosen {
             let near = NearRobots::kept(chosen, &sources.masks, None)?;
-            let folders = self.label_folders(chosen, &sources.inputs);
-            labelling.join(&near, spaces, &folders, next, engine)?.finish(engine)?
+            let pieces = self.label_folders(chosen, &sources.inputs);
+            let groups = self.file_folders(chosen, sources);
+            labelling.join(&near, spaces, [&pieces, &groups], next, engine)?.finish(engine)?
         } else {
             let near = labelling.near_robots(store, engine)?;
             let to = LabelFolders { out: next, clouds: next };
@@ -277,6 +305,7 @@ impl<'a> Run<'a> {
         fits: Vec<Fit>,
         written: &WrittenLabels,
         outcome: &Outcome,
+        page_parts: &[PathBuf],
     ) -> Result<Vec<String>> {
         let &Run { job, settings, output, digests, engine, .. } = self;
         let (sources, next) = (plant.sources, output.next());
@@ -295,7 +324,8 @@ impl<'a> Run<'a> {
         }
         .write(next)?;
         let files = written.digests.iter().map(|sum| OutputFile::of(next, sum)).collect();
-        let page = |files: &VerifiedFiles| page::of_run(next, files, &job.means, engine);
+        let page =
+            |files: &VerifiedFiles| page::of_run(next, files, page_parts, (&job.means, engine));
         WholeResult { job, output, digests, outcome, files }.publish(page, engine)
     }
 }

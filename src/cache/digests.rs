@@ -176,6 +176,11 @@ impl Digests {
         Key::of("labels", &[robots.name(), &words(&input.id)])
     }
 
+    /// Key of a group of files of the result with the robots of this key.
+    pub(crate) fn files_key(robots: &Key, group: &impl Debug) -> Key {
+        Key::of("files", &[robots.name(), &words(group)])
+    }
+
     /// Identity of a shard: it stays the same while the job and its files do. Contents of inputs
     /// are not part of it, since it is known before they are read.
     pub(crate) fn shard_key(&self, job: &Job, kind: &str, of: &impl Debug) -> Key {

@@ -40,6 +40,8 @@ pub(super) enum SchemaName {
     Robot,
     /// A scene file of simulate
     Scene,
+    /// The list of shards --json
+    Shards,
 }
 
 #[derive(Debug, Args)]

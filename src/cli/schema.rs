@@ -20,6 +20,7 @@ fn text(name: SchemaName) -> &'static str {
         SchemaName::Readings => include_str!("../guide/schemas/readings.schema.json"),
         SchemaName::Robot => include_str!("../guide/schemas/robot.schema.json"),
         SchemaName::Scene => include_str!("../guide/schemas/scene.schema.json"),
+        SchemaName::Shards => include_str!("../guide/schemas/shards.schema.json"),
     }
 }
 

@@ -73,7 +73,7 @@ fn search(seen: &ExpectedRegions, n_models: usize, job: &Job, engine: &Engine) {
 fn of_points(n: f64, reading: f64, job: &Job) -> Vec<(&'static str, f64)> {
     let threads = job.means.n_threads as f64;
     let [storing, planes, near, writing] = REST.map(|rate| n / rate / threads);
-    let page = if job.means.settings.export.page { n / PAGE } else { 0.0 };
+    let page = if job.means.settings.export.page { n / PAGE / threads } else { 0.0 };
     vec![
         ("ingest", reading / threads),
         ("store", storing),

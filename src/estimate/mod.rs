@@ -7,7 +7,7 @@ mod nodes;
 mod rates;
 mod search_time;
 pub(crate) mod shard_costs;
-mod sizes;
+pub(crate) mod sizes;
 
 use crate::cache::{Digests, OutputDir};
 use crate::detect::library;
@@ -209,8 +209,7 @@ impl Estimate {
         let copc = if export.copc { COPC_BYTES + (cloud as f64 * COMPRESSED) as u64 } else { 0 };
         let labelled = n.saturating_mul(LABEL_BYTES + clouds + copc);
         let page = n.saturating_mul(PAGE_POINT_BYTES).saturating_add(1 << 20).min(PAGE_BYTES);
-        // One thread makes the page, whatever their number.
-        seconds += if export.page { n as f64 / PAGE * threads } else { 0.0 };
+        seconds += if export.page { n as f64 / PAGE } else { 0.0 };
         seconds += if export.copc { n as f64 / COPC } else { 0.0 };
         let base = PROGRAM_BYTES + models * MODEL_BYTES;
         let memory = n.saturating_mul(POINT_BYTES).saturating_add(base);
@@ -247,6 +246,12 @@ impl Estimate {
     /// Disk space that the job takes, bytes.
     fn need(&self) -> u64 {
         self.store_bytes.saturating_add(self.output_bytes)
+    }
+
+    /// The same job where so many bytes of the result lie on the disk already.
+    #[must_use]
+    pub(crate) fn with_written(self, n_bytes: u64) -> Self {
+        Self { output_bytes: self.output_bytes.saturating_sub(n_bytes), ..self }
     }
 
     /// Refuses a job that exceeds the free disk space or the limit of spatial tiles.

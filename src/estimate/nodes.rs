@@ -7,6 +7,7 @@ use super::rates::SPREAD;
 use super::search_time;
 use super::shard_costs::ShardCosts;
 use super::sizes::STORE_BYTES;
+use crate::label::joined_files::FileGroup;
 use contract::Input;
 use ingest::Sources;
 use serde::Serialize;
@@ -81,6 +82,8 @@ impl NodePlan {
             labels.chain(regions.iter().map(|_| costs.space().seconds)).collect();
         let tiles = of_inputs(&|input| costs.tiles(input).seconds);
         let planes = of_inputs(&|input| costs.ground_part(input).seconds);
+        let files = FileGroup::all(estimate.n_points).into_iter();
+        let files = files.map(|group| costs.files(group).seconds).collect();
         let joined = |seconds: f64| vec![seconds];
         let phases = vec![
             NodePhase::of("tiles", tiles, 1.0, places),
@@ -89,6 +92,7 @@ impl NodePlan {
             NodePhase::of("regions", search, SPREAD, places),
             NodePhase::of("robots", joined(costs.robots(regions.len()).seconds), 1.0, places),
             NodePhase::of("labels", labels, 1.0, places),
+            NodePhase::of("files", files, 1.0, places),
             NodePhase::of("gather", joined(costs.gather().seconds), 1.0, places),
         ];
         let sum = |i: usize| phases.iter().map(|phase| phase.seconds[i]).sum::<f64>();

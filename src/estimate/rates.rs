@@ -21,7 +21,7 @@ pub(super) const INGEST: [(Format, f64); 8] = [
 pub(super) const REST: [f64; 4] = [30e6, 8e6, 60e6, 9e6];
 /// Points per second of one thread in the COPC conversion.
 pub(super) const COPC: f64 = 0.9e6;
-/// Points per second of the one thread that makes the page of the result.
+/// Points per second of each thread that reads the points of the page of the result.
 pub(super) const PAGE: f64 = 9e6;
 /// Seconds of one thread per megabyte of a model's folder, for reading, joining and sampling its
 /// meshes.

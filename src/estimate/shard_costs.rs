@@ -2,9 +2,10 @@
 
 use super::rates::{AREA, INGEST, PAGE, REGION, REST, SURFACE};
 use super::sizes::{
-    LABEL_BYTES, MODEL_BYTES, POINT_BYTES, PROGRAM_BYTES, SCAN_BYTES, SCANS, points,
+    LABEL_BYTES, MODEL_BYTES, POINT_BYTES, PROGRAM_BYTES, SCAN_BYTES, SCANS, all_points, points,
 };
 use crate::job::Means;
+use crate::label::joined_files::FileGroup;
 use contract::{Cluster, Input, Region};
 use ingest::Sources;
 
@@ -15,6 +16,8 @@ const START: f64 = 0.3;
 const OPEN: f64 = 0.0075;
 /// Points per second that one thread copies from the pieces of inputs to files of the result.
 const JOIN: f64 = 20e6;
+/// Number of points that the page of a result is written from, at most.
+const PAGE_POINTS: u64 = report_page::MOST_POINTS as u64;
 /// Points per second of one thread that labels an input and writes its piece.
 const LABELS: f64 = 4e6;
 /// Processor seconds for the space around one robot.
@@ -56,8 +59,7 @@ impl<'a> ShardCosts<'a> {
     }
 
     fn all_points(&self) -> u64 {
-        let of = |input: &Input| points(self.sources, input);
-        self.sources.inputs.iter().fold(0, |sum, input| sum.saturating_add(of(input)))
+        all_points(self.sources)
     }
 
     /// Reading an input into tiles.
@@ -109,10 +111,16 @@ impl<'a> ShardCosts<'a> {
         self.cost(n as f64 / LABELS, n / LABEL_BYTES)
     }
 
-    /// Joining all labels to the result.
-    pub(crate) fn gather(&self) -> ShardCost {
+    /// Joining a group of files from the labels of all inputs.
+    pub(crate) fn files(&self, group: FileGroup) -> ShardCost {
         let n = self.all_points() as f64;
-        let page = if self.means.settings.export.page { n / PAGE } else { 0.0 };
-        self.cost(n / JOIN + page, self.all_points())
+        let page = if self.means.settings.export.page { group.page_share() } else { 0.0 };
+        self.cost(n * group.share() / (2.0 * JOIN) + n * page / PAGE, PAGE_POINTS)
+    }
+
+    /// Giving the result its files, and writing its page of at most so many points.
+    pub(crate) fn gather(&self) -> ShardCost {
+        let page = if self.means.settings.export.page { PAGE_POINTS as f64 / PAGE } else { 0.0 };
+        self.cost(page, self.all_points())
     }
 }

@@ -27,3 +27,8 @@ pub(super) fn points(sources: &Sources, input: &Input) -> u64 {
     let in_scans: Option<u64> = scans.map(|s| s.stated_points).sum();
     sources.n_stated(input.id).or(in_scans).unwrap_or(input.n_bytes / TEXT_BYTES)
 }
+
+/// Number of points of all inputs, as [`points`].
+pub(crate) fn all_points(sources: &Sources) -> u64 {
+    sources.inputs.iter().fold(0, |sum, input| sum.saturating_add(points(sources, input)))
+}

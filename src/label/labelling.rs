@@ -190,6 +190,11 @@ impl<'a> Labelling<'a> {
         }
     }
 
+    /// The robots with their models.
+    pub(super) fn robots(&self) -> FittedRobots<'a> {
+        FittedRobots { fits: self.fits, models: self.models }
+    }
+
     /// The floor, for the label of a point that is near no robot.
     pub(crate) fn ground(&self) -> &FloorHeights {
         &self.ground
@@ -197,7 +202,7 @@ impl<'a> Labelling<'a> {
 
     /// Labels of points near the robots, and the bodies attached to them.
     pub(crate) fn near_robots(&self, store: &Store, engine: &Engine) -> Result<NearRobots> {
-        let robots = FittedRobots { fits: self.fits, models: self.models };
+        let robots = self.robots();
         let (scans, n_masks) = (self.sources.scans.as_slice(), self.sources.masks.len());
         let scans =
             ScansNearRobots { store, floor: self.floor, clusters: self.clusters, scans, n_masks };

@@ -200,7 +200,7 @@ impl Rescan<'_> {
         state.write(output.next())?;
         // The only step that reads all tiles of the plant; the settings can leave it out.
         let next = output.next();
-        let page = |files: &VerifiedFiles| page::of_run(next, files, &job.means, engine);
+        let page = |files: &VerifiedFiles| page::of_run(next, files, &[], (&job.means, engine));
         WholeResult { job, output, digests, outcome, files }.publish(page, engine)
     }
 }

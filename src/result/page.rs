@@ -9,11 +9,12 @@ use crate::detect::robots::RobotList;
 use crate::engine::{Amount, Engine};
 use crate::io::own_paths::without_links;
 use crate::job::{Job, Means};
+use crate::label::page_parts::{self, TileReader};
 use contract::{Error, Fit, Kind, Result, Verdict};
-use export::{BasePose, InputEntry, ResultFile, RobotEntry, WrittenBodies, read_tile};
+use export::{BasePose, InputEntry, ResultFile, RobotEntry, WrittenBodies};
 use geometry::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use report_page::{PageLoop, PagePoint, PagePoints, PageRobot, PageScanner, PageTexts, ReportPage};
+use report_page::{PageLoop, PagePoints, PageRobot, PageScanner, PageTexts, ReportPage};
 use robot::Model;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ pub(crate) struct ReportedResult<'a> {
     engine: &'a Engine,
     /// Times, rates and memory of the run, where they are to stand on the page.
     run: Vec<(String, String)>,
+    /// Files with the points of parts, where other processes have read the tiles.
+    parts: &'a [PathBuf],
 }
 
 impl<'a> ReportedResult<'a> {
@@ -42,7 +45,7 @@ impl<'a> ReportedResult<'a> {
         engine: &'a Engine,
     ) -> Result<Self> {
         let (result, state) = (files.result()?, PlantState::read(files)?);
-        Ok(Self { out, files, result, state, means, engine, run: Vec::new() })
+        Ok(Self { out, files, result, state, means, engine, run: Vec::new(), parts: &[] })
     }
 
     /// The same with times, rates and memory of its run, as far as their record is there.
@@ -78,7 +81,7 @@ impl<'a> ReportedResult<'a> {
             page.add_robot(self.robot(entry, &loops)?);
         }
         self.add_pictures(&mut page)?;
-        let mut points = page.points();
+        let mut points = page.points(page_parts::middle(&self.state.fits));
         self.add_points(&mut points)?;
         self.add_spaces(&mut points)?;
         page.html(&points)
@@ -175,26 +178,18 @@ impl<'a> ReportedResult<'a> {
         Ok(())
     }
 
-    /// Reads all tiles, one after the other.
+    /// Adds the points of all tiles, or of the parts that other processes have read.
     fn add_points(&self, points: &mut PagePoints) -> Result<()> {
-        let names = self.files.manifest().files.iter().map(|file| file.path.as_str());
-        let tiles: Vec<&str> = names.filter(|path| path.starts_with("tiles/")).collect();
-        let las = self.state.records.las();
-        let stage = self.engine.progress.stage("page", Amount::items(tiles.len() as u64));
-        for tile in tiles {
-            self.engine.cancel.check()?;
-            let (path, stated) = self.files.stated(tile)?;
-            let mut piece: Vec<PagePoint> = Vec::new();
-            read_tile(&path, &las, stated, |old| {
-                piece.clear();
-                piece.extend(old.iter().map(|p| PagePoint { world: p.world, label: p.label }));
-                points.add(&piece);
-                stage.add(0, old.len() as u64, 0);
-                Ok(())
-            })?;
-            points.settle();
-            stage.add(1, 0, 0);
+        if !self.parts.is_empty() {
+            return page_parts::join(self.parts, points);
         }
+        let names = self.files.manifest().files.iter().map(|file| file.path.as_str());
+        let names: Vec<&str> = names.filter(|path| path.starts_with("tiles/")).collect();
+        let las = self.state.records.las();
+        let stage = self.engine.progress.stage("page", Amount::items(names.len() as u64));
+        let reader = TileReader { las: &las, engine: self.engine, stage: Some(&stage) };
+        let tiles = names.iter().map(|name| self.files.stated(name)).collect::<Result<_>>()?;
+        reader.read(tiles, points)?;
         stage.finish();
         Ok(())
     }
@@ -223,20 +218,22 @@ fn title(inputs: &[InputEntry]) -> String {
 }
 
 /// Makes the page of a result that is about to be published, unless the settings leave it out.
-/// Returns a message where it cannot be made of the result: that does not make the run fail.
+/// `parts` are files with its points, where there are such ([`page_parts`]). Returns a message where
+/// it cannot be made of the result: that does not make the run fail.
 ///
 /// # Errors
 /// The run was interrupted, or the page cannot be written.
 pub(crate) fn of_run(
     next: &Path,
     files: &VerifiedFiles,
-    means: &Means,
-    engine: &Engine,
+    parts: &[PathBuf],
+    (means, engine): (&Means, &Engine),
 ) -> Result<Vec<String>> {
     if !means.settings.export.page {
         return Ok(Vec::new());
     }
-    let page = ReportedResult::open(next, files, means, engine).and_then(|result| result.write());
+    let page = ReportedResult::open(next, files, means, engine);
+    let page = page.and_then(|result| ReportedResult { parts, ..result }.write());
     match page {
         Ok(_) => Ok(Vec::new()),
         // On a full disk the next run would find a result without its page, and leave it so.

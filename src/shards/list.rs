@@ -24,6 +24,8 @@ pub enum ShardKind {
     Space,
     /// Masks and records of an input.
     Labels,
+    /// A group of tiles or clouds of the result.
+    Files,
     /// The result: the last join.
     Gather,
 }

@@ -8,6 +8,7 @@ use crate::detect::ground::Ground;
 use crate::detect::robots::{KeptRobots, RobotList};
 use crate::estimate::shard_costs::{ShardCost, ShardCosts};
 use crate::label::input_labels;
+use crate::label::joined_files::{self, FileGroup};
 use crate::label::known_space::KnownSpaces;
 use crate::label::near_robots::NearRobots;
 use crate::plan::{Opened, ROBOTS, Run};
@@ -31,6 +32,7 @@ pub(super) enum ShardTask {
     Robots,
     Space(usize),
     Labels(usize),
+    Files(FileGroup),
     Gather,
 }
 
@@ -304,7 +306,7 @@ impl Growing<'_> {
         Ok(self.labels(opened, costs, &chosen, &robots_list, &robots))
     }
 
-    /// Adds the spaces of robots and the labels of inputs.
+    /// Adds the spaces of robots, the labels of inputs, and the files that are joined from these.
     fn labels(
         &mut self,
         opened: &Opened,
@@ -330,8 +332,9 @@ impl Growing<'_> {
             }));
         }
         let folders = run.label_folders(chosen, &opened.sources.inputs);
+        let mut pieces = Vec::new();
         for (at, (input, folder)) in opened.sources.inputs.iter().zip(&folders).enumerate() {
-            last.push(self.add(Added {
+            pieces.push(self.add(Added {
                 task: ShardTask::Labels(at),
                 kind: ShardKind::Labels,
                 id: id(run, "labels", &(chosen.key(), &input.path)),
@@ -342,6 +345,19 @@ impl Growing<'_> {
                 is_done: input_labels::is_whole(folder),
             }));
         }
+        for (group, folder) in run.file_groups(chosen, &opened.sources) {
+            last.push(self.add(Added {
+                task: ShardTask::Files(group),
+                kind: ShardKind::Files,
+                id: id(run, "files", &(chosen.key(), group)),
+                what: group.words(),
+                inputs: &all,
+                needs: pieces.clone(),
+                cost: costs.files(group),
+                is_done: joined_files::is_whole(&folder),
+            }));
+        }
+        last.extend(pieces);
         last
     }
 }

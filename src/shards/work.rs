@@ -11,6 +11,7 @@ use crate::detect::search::{PreparedLibrary, Search};
 use crate::engine::guarded;
 use crate::job::Outcome;
 use crate::label::input_labels;
+use crate::label::joined_files::{self, FileGroup};
 use crate::label::known_space::KnownSpaces;
 use crate::label::labelling::{Labelling, ScansToLabel};
 use crate::label::near_robots::NearRobots;
@@ -19,6 +20,7 @@ use crate::store::{Store, spatial_tiles};
 use contract::{Error, Fit, Kind, Region, Result};
 use export::atomic;
 use serde::Serialize;
+use std::path::Path;
 
 /// How a shard came to be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -144,6 +146,7 @@ impl OfPlant<'_> {
             ShardTask::Robots => self.robots(&search, &fits),
             ShardTask::Space(at) => self.space(at, &search),
             ShardTask::Labels(at) => self.labels(at, &search),
+            ShardTask::Files(group) => self.files(group),
             _ => Err(Error::new(Kind::Bug, "this shard is made without a plant")),
         }
     }
@@ -199,6 +202,21 @@ impl OfPlant<'_> {
         self.run.engine.fan_out("space", vec![()], one).map(drop)
     }
 
+    /// Joins a group of files from the labels of all inputs.
+    fn files(&self, group: FileGroup) -> Result<()> {
+        let Self { run, opened, .. } = self;
+        let (chosen, robots) = self.chosen()?;
+        let pieces = run.label_folders(&chosen, &opened.sources.inputs);
+        let groups = run.file_groups(&chosen, &opened.sources);
+        let place = groups.into_iter().find(|(other, _)| *other == group);
+        let (_, place) = place.ok_or_else(|| Error::new(Kind::Bug, "no such group of files"))?;
+        let prefix = format!("new-files-{}-", group.at);
+        let new = run.output.labels().join(format!("{prefix}{}", atomic::own_word()));
+        let labelling = self.labelling(&robots);
+        let written = joined_files::write(&labelling, &pieces, group, &new, run.engine);
+        settled(written, &new, &place, &prefix, joined_files::is_whole)
+    }
+
     fn labels(&self, at: usize, search: &Search<'_, '_>) -> Result<()> {
         let Self { run, opened, .. } = self;
         let (chosen, robots) = self.chosen()?;
@@ -212,10 +230,21 @@ impl OfPlant<'_> {
         let labelling = self.labelling(&robots);
         let written = input_labels::write(labelling, &near, &grids, input, &new, run.engine);
         let written = written.and_then(|()| run.digests.check(input));
-        if let Err(error) = written {
-            let _ = std::fs::remove_dir_all(&new);
-            return Err(error);
-        }
-        settle_folder(&new, place, &prefix, input_labels::is_whole)
+        settled(written, &new, place, &prefix, input_labels::is_whole)
     }
+}
+
+/// Gives the new folder of a piece its place, or removes it where it could not be written.
+fn settled(
+    written: Result<()>,
+    new: &Path,
+    place: &Path,
+    prefix: &str,
+    is_whole: impl Fn(&Path) -> bool,
+) -> Result<()> {
+    if let Err(error) = written {
+        let _ = std::fs::remove_dir_all(new);
+        return Err(error);
+    }
+    settle_folder(new, place, prefix, is_whole)
 }

@@ -129,6 +129,7 @@ fn keep_to_their_schemas(at: &Path) {
         ("scene", "demo/scene.toml"),
         ("review", "review.toml"),
         ("config", "plant.toml"),
+        ("shards", "shards.json"),
     ]
     .map(|(name, file)| (name, at.join(file)))
     .into();

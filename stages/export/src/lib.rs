@@ -25,6 +25,7 @@
 pub mod atomic;
 pub mod block;
 mod bodies;
+mod body_cells;
 mod calibration;
 mod canvas;
 mod change_picture;

@@ -1,11 +1,11 @@
 //! Draws the plan of an input: the plant from above, by its labelled points.
 
+use crate::body_cells::BodyCells;
 use crate::canvas::{Canvas, INK, Rgb, WHITE, blend, robot_color};
 use crate::font::TextSize::{Body, Title};
 use crate::picture_names::PictureNames;
 use contract::{Label, PointKind};
 use geometry::Aabb;
-use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
 
 /// Smallest cell, metres.
@@ -206,12 +206,11 @@ impl PlanPicture {
     fn outline(&self, canvas: &mut Canvas, zoom: i64, body: &[[f64; 2]], colour: Rgb) {
         let cell =
             |p: &[f64; 2]| [0, 1].map(|i| ((p[i] - self.min[i]) * self.per_metre).floor() as i64);
-        let beside = |[u, v]: [i64; 2]| (0..9).map(move |k| [u + k % 3 - 1, v + k / 3 - 1]);
-        let full: BTreeSet<[i64; 2]> = body.iter().map(cell).flat_map(beside).collect();
         let (w, h) = (self.width as i64, self.height as i64);
-        for &[u, v] in full.iter().filter(|[u, v]| (0..w).contains(u) && (0..h).contains(v)) {
+        let body = BodyCells::new(body.iter().map(cell), [w, h]);
+        for [u, v] in body.cells().filter(|[u, v]| (0..w).contains(u) && (0..h).contains(v)) {
             let edges = [[u - 1, v], [u + 1, v], [u, v - 1], [u, v + 1]];
-            if edges.iter().any(|side| !full.contains(side)) {
+            if !edges.into_iter().all(|side| body.has(side)) {
                 let y = 2 * MARGIN + (h - 1 - v) * zoom;
                 canvas.fill(MARGIN + u * zoom, y, zoom, zoom, colour);
             }

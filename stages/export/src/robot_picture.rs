@@ -215,14 +215,16 @@ impl PictureView {
         let local_from_world = Pose::from_parts((-self.origin.coords).into(), Default::default());
         for (index, (link, pose)) in model.links.iter().zip(world_from_link).enumerate() {
             let local_from_link = rows(&(local_from_world * pose));
-            let corner = |i: u32| {
-                let p = link.mesh.vertices.get(i as usize).copied().unwrap_or_default();
-                let local = transform(&local_from_link, p);
+            let placed = |p: &[f32; 3]| {
+                let local = transform(&local_from_link, *p);
                 (local, transform(&self.view_from_world, local))
             };
+            let corners: Vec<_> = link.mesh.vertices.iter().map(placed).collect();
             for triangle in &link.mesh.triangles {
+                let corner = |i: u32| corners.get(i as usize).copied().unwrap_or_default();
                 let [(a, p), (b, q), (c, r)] = triangle.map(corner);
-                fill_triangle(&mut shown, [p, q, r], normal(a, b, c), index as u16);
+                // Most triangles of a vendor's mesh hold the middle of no pixel.
+                fill_triangle(&mut shown, [p, q, r], || normal(a, b, c), index as u16);
             }
         }
         let away: Vector = [0, 1, 2].map(|i| f64::from(self.view_from_world[2][i])).into();
@@ -314,15 +316,20 @@ fn normal(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
 
 /// Fills the pixels whose centre lies inside a triangle (pixels right, pixels down, depth) where it
 /// is nearest.
-fn fill_triangle(shown: &mut [Shown], corners: [[f32; 3]; 3], normal: [f32; 3], link: u16) {
-    let [a, b, c] = corners;
+fn fill_triangle(
+    shown: &mut [Shown],
+    [a, b, c]: [[f32; 3]; 3],
+    normal: impl Fn() -> [f32; 3],
+    link: u16,
+) {
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     if area == 0.0 || !area.is_finite() {
         return;
     }
     let range = |i: usize| {
-        let low = a[i].min(b[i]).min(c[i]).floor().clamp(0.0, SIDE as f32) as usize;
-        let high = a[i].max(b[i]).max(c[i]).ceil().clamp(0.0, SIDE as f32) as usize;
+        // From the first to the last pixel whose centre is not beside the triangle.
+        let low = (a[i].min(b[i]).min(c[i]) - 0.5).ceil().clamp(0.0, SIDE as f32) as usize;
+        let high = (a[i].max(b[i]).max(c[i]) + 0.5).floor().clamp(0.0, SIDE as f32) as usize;
         low..high
     };
     for v in range(1) {
@@ -338,7 +345,7 @@ fn fill_triangle(shown: &mut [Shown], corners: [[f32; 3]; 3], normal: [f32; 3], 
             let depth = x * a[2] + y * b[2] + z * c[2];
             let pixel = &mut shown[v * SIDE + u];
             if depth < pixel.depth {
-                *pixel = Shown { depth, link, normal };
+                *pixel = Shown { depth, link, normal: normal() };
             }
         }
     }

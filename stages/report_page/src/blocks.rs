@@ -27,12 +27,21 @@ impl Owner {
         }
     }
 
-    /// Number that stands for it in the page.
+    /// Number that stands for it in the page and in parts.
     pub(crate) fn number(self) -> i32 {
         match self {
             Self::Still => -1,
             Self::Unknown => -2,
             Self::Robot(index) => i32::from(index),
+        }
+    }
+
+    /// The owner with this number; `None` for a number that none has.
+    pub(crate) fn of_number(number: i32) -> Option<Self> {
+        match number {
+            -1 => Some(Self::Still),
+            -2 => Some(Self::Unknown),
+            index => u16::try_from(index).ok().map(Self::Robot),
         }
     }
 }
@@ -82,7 +91,7 @@ pub(crate) type BlockKey = (Owner, [i32; 3]);
 /// Points of one block: place and tag, 46 bits each.
 #[derive(Debug, Clone)]
 pub(crate) struct Block {
-    entries: Vec<u64>,
+    pub(crate) entries: Vec<u64>,
     n_thinned: usize,
     /// For each cell of 0.8 m whether it is near a robot.
     near: Box<[bool; 512]>,
@@ -91,11 +100,11 @@ pub(crate) struct Block {
 /// Collects points, thinned to what a page can hold.
 #[derive(Debug, Clone)]
 pub struct PagePoints {
-    blocks: BTreeMap<BlockKey, Block>,
+    pub(crate) blocks: BTreeMap<BlockKey, Block>,
     /// Bounds within which points are kept finely, metres.
     near: Vec<Aabb>,
     /// Subtracted from world coordinates, metres.
-    origin: [f64; 3],
+    pub(crate) origin: [f64; 3],
     rung: usize,
     most: usize,
     /// Number of points of each kind, before any was left out.
@@ -103,12 +112,12 @@ pub struct PagePoints {
 }
 
 impl PagePoints {
-    /// Room for `most` points; `robots` are the bounds of the robots, world, metres.
+    /// Room for `most` points; `robots` are the bounds of the robots, and `middle` is any place of
+    /// the plant, world, metres.
     #[must_use]
-    pub fn new(robots: &[Aabb], most: usize) -> Self {
+    pub fn new(robots: &[Aabb], middle: [f64; 3], most: usize) -> Self {
         let all = robots.iter().filter(|b| !b.is_empty());
         let near: Vec<Aabb> = all.map(|bounds| bounds.grown(NEAR)).collect();
-        let middle: [f64; 3] = near.first().map_or([0.0; 3], |b| b.center().into());
         // Whole kilometres: what is near the origin keeps its numbers.
         let origin = middle.map(|v| (v / 1e3).trunc() * 1e3);
         Self { blocks: BTreeMap::new(), near, origin, rung: 0, most, n_of_kind: [0; 5] }
@@ -187,10 +196,15 @@ impl PagePoints {
             ((within * f64::from(STEPS)) as u32).min(STEPS - 1)
         });
         let entry = u64::from(join(steps)) << TAG_BITS | u64::from(tag);
+        self.extend((owner, at), [entry]);
+    }
+
+    /// Adds entries to a block.
+    pub(crate) fn extend(&mut self, key: BlockKey, entries: impl IntoIterator<Item = u64>) {
+        let (owner, at) = key;
         let near = (&self.near, self.origin);
-        let block =
-            self.blocks.entry((owner, at)).or_insert_with(|| Block::new(owner, at, near.0, near.1));
-        block.entries.push(entry);
+        let block = self.blocks.entry(key).or_insert_with(|| Block::new(owner, at, near.0, near.1));
+        block.entries.extend(entries);
         if block.entries.len() > 2 * block.n_thinned + WAITING {
             block.thin(owner, LADDER[self.rung]);
         }

@@ -11,7 +11,7 @@
 //!
 //! let result = r#"{"robots": [], "inputs": [], "stages": [], "warnings": []}"#.to_owned();
 //! let page = ReportPage::new(PageTexts { result, ..PageTexts::default() }, Vec::new());
-//! let mut points = page.points();
+//! let mut points = page.points([0.0; 3]);
 //! points.add(&[PagePoint { world: [1.0, 2.0, 0.0], label: Label::FLOOR }]);
 //! points.settle();
 //! let html = page.html(&points)?;
@@ -26,9 +26,11 @@ mod input;
 mod meshes;
 mod morton;
 mod page;
+mod part;
 mod texts;
 mod trees;
 
 pub use blocks::PagePoints;
 pub use input::{PageLoop, PagePin, PagePoint, PageRobot, PageScanner, PageTexts};
 pub use page::{MOST_POINTS, PAGE_SCHEMA, ReportPage};
+pub use part::PagePart;

@@ -122,10 +122,11 @@ impl ReportPage {
         self.pictures.push((id.into(), png));
     }
 
-    /// Room for the points of the page, once all robots are there.
+    /// Room for the points of the page, once all robots are there; `middle` is any place of the
+    /// plant, world, metres.
     #[must_use]
-    pub fn points(&self) -> PagePoints {
-        PagePoints::new(&self.bounds, MOST_POINTS)
+    pub fn points(&self, middle: [f64; 3]) -> PagePoints {
+        PagePoints::new(&self.bounds, middle, MOST_POINTS)
     }
 
     /// The data of the page as JSON, without what only its 3D view needs; counts of points by kind

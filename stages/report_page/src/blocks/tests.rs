@@ -23,8 +23,8 @@ fn all(points: &PagePoints, most: usize) -> Vec<(BlockKey, LeveledBlock)> {
 #[test]
 fn one_point_a_voxel_stays_and_near_robots_more() {
     let robot = Aabb { min: [1.0, 1.0, 0.0], max: [2.0, 2.0, 2.0] };
-    let mut far = PagePoints::new(&[], 1_000_000);
-    let mut near = PagePoints::new(&[robot], 1_000_000);
+    let mut far = PagePoints::new(&[], [0.0; 3], 1_000_000);
+    let mut near = PagePoints::new(&[robot], [0.0; 3], 1_000_000);
     let floor = floor(640, 0.01);
     far.add(&floor);
     near.add(&floor);
@@ -38,7 +38,7 @@ fn one_point_a_voxel_stays_and_near_robots_more() {
 
 #[test]
 fn no_more_points_stay_than_there_is_room_for() {
-    let mut points = PagePoints::new(&[], 20_000);
+    let mut points = PagePoints::new(&[], [0.0; 3], 20_000);
     for piece in floor(900, 0.01).chunks(50_000) {
         points.add(piece);
         points.settle();
@@ -52,7 +52,7 @@ fn no_more_points_stay_than_there_is_room_for() {
 
 #[test]
 fn levels_are_thinnings_of_the_whole() {
-    let mut points = PagePoints::new(&[], 1_000_000);
+    let mut points = PagePoints::new(&[], [0.0; 3], 1_000_000);
     points.add(&floor(640, 0.01));
     let blocks = all(&points, 1_000_000);
     assert_eq!(blocks.len(), 1);
@@ -73,7 +73,7 @@ fn levels_are_thinnings_of_the_whole() {
 
 #[test]
 fn points_of_robots_keep_link_and_whether_they_hang_on_it() {
-    let mut points = PagePoints::new(&[], 1_000);
+    let mut points = PagePoints::new(&[], [0.0; 3], 1_000);
     points.add(&[
         point([0.1, 0.1, 0.1], PointKind::Link, 4, 7),
         point([0.2, 0.1, 0.1], PointKind::Attachment, 4, 9),
@@ -101,7 +101,7 @@ fn only_the_faces_of_unseen_space_are_shown() {
             space.voxels_mut()[at] = SpaceKind::Free;
         }
     }
-    let mut points = PagePoints::new(&[], 10_000);
+    let mut points = PagePoints::new(&[], [0.0; 3], 10_000);
     points.add_space(&space);
     assert_eq!(points.n_points(), 400, "one layer below what is free");
 }
@@ -116,7 +116,7 @@ proptest! {
             })
             .collect();
         let of = |pieces: &[&[PagePoint]]| {
-            let mut points = PagePoints::new(&[], 700);
+            let mut points = PagePoints::new(&[], [0.0; 3], 700);
             for piece in pieces {
                 points.add(piece);
                 points.settle();

@@ -63,7 +63,7 @@ fn element<'a>(html: &'a str, id: &str) -> &'a str {
 #[test]
 fn no_name_gets_out_of_its_place() {
     let page = page(NASTY);
-    let html = page.html(&page.points()).expect("a page");
+    let html = page.html(&page.points([0.0; 3])).expect("a page");
     for bad in ["<img src", "onerror=alert(1)>", "\u{202e}", "<!--"] {
         assert!(!html.contains(bad), "{bad}");
     }
@@ -80,7 +80,7 @@ fn no_name_gets_out_of_its_place() {
 #[test]
 fn the_policy_allows_its_own_script_and_style_and_nothing_else() {
     let page = page("hall");
-    let html = page.html(&page.points()).expect("a page");
+    let html = page.html(&page.points([0.0; 3])).expect("a page");
     let script = html.rsplit_once("<script>").expect("a script").1;
     let script = script.split_once("</script>").expect("its end").0;
     let style = html.split_once("<style>").expect("a style").1;
@@ -101,7 +101,7 @@ fn the_policy_allows_its_own_script_and_style_and_nothing_else() {
 #[test]
 fn points_come_back_where_they_were() {
     let page = page("hall");
-    let mut points = page.points();
+    let mut points = page.points([0.0; 3]);
     let at = |i: u32| [f64::from(i) * 0.37 - 9.0, f64::from(i % 17), 0.4];
     let of = |i: u32| PagePoint {
         world: at(i),
@@ -146,7 +146,7 @@ fn points_come_back_where_they_were() {
 #[test]
 fn a_large_hall_is_a_page_of_bounded_length_and_equal_bytes() {
     let page = page("hall");
-    let mut points = page.points();
+    let mut points = page.points([0.0; 3]);
     // Without any surface nothing is thinned by voxels alone.
     let at = |k: u64| {
         let of = |i: u64| (crate::morton::scatter(3 * k + i) % 100_000) as f64 * 1e-3;
@@ -189,7 +189,7 @@ fn pictures_stand_on_the_page_as_far_as_they_fit() {
     own.add_picture("R1", b"first".to_vec());
     own.add_picture("R2", vec![7; MOST_TEXT]);
     own.add_picture("R3", b"third".to_vec());
-    let html = own.html(&own.points()).expect("a page");
+    let html = own.html(&own.points([0.0; 3])).expect("a page");
     let known: serde_json::Value =
         serde_json::from_str(element(&html, "pictures")).expect("parses");
     // "R2" does not fit: the page refers to its file.
