@@ -218,8 +218,8 @@ fn title(inputs: &[InputEntry]) -> String {
 }
 
 /// Makes the page of a result that is about to be published, unless the settings leave it out.
-/// `parts` are files with its points, where there are such ([`page_parts`]). Returns a message where
-/// it cannot be made of the result: that does not make the run fail.
+/// `parts` are files with its points, where there are such ([`page_parts`]). Returns a message
+/// where it cannot be made of the result: that does not make the run fail.
 ///
 /// # Errors
 /// The run was interrupted, or the page cannot be written.
