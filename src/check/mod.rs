@@ -5,6 +5,7 @@
 //! without beams is not free. Contacts that exist already in the found posture are reported
 //! separately.
 
+mod outlines;
 mod report;
 mod strays;
 mod subject;
@@ -24,6 +25,7 @@ use crate::result::plant_state::PlantState;
 use clearance::{Contacts, Obstacles, PathWalk, RobotBody};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
+use outlines::Outlines;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use subject::CheckedRobot;
@@ -114,7 +116,8 @@ pub(crate) fn at_robots<T>(
         })
         .collect();
     robots.iter().try_for_each(|robot| robot.is_of_the_library(files.manifest()))?;
-    let around = Surroundings { out, files: &files, state: &state, result: &result };
+    let outlines = Outlines::default();
+    let around = Surroundings { out, files: &files, state: &state, result: &result, outlines };
     let mut all: Vec<(usize, T)> = Vec::new();
     for (number, items) in items {
         let robot = robots.iter().find(|robot| robot.number == number);

@@ -129,7 +129,7 @@ impl PointEvidence<'_> {
         };
         lines::is_on_clear_plane(&near, &here, &eyes)
             || lines::is_on_clear_bar(&near, &here, &eyes)
-            || lines::is_on_clear_line(&mut near, &here, &eyes)
+            || lines::is_on_clear_line(&near, &here, &eyes)
             || lines::is_on_long_line(&far(), &here, &eyes)
     }
 }

@@ -56,14 +56,13 @@ pub(crate) fn is_on_line(near: &[Offset]) -> bool {
 
 /// Whether most of the points lie on one line through the origin, which is at `here`, that does not
 /// follow a beam.
-pub(crate) fn is_on_clear_line(near: &mut [Offset], here: &Point, eyes: &[Point]) -> bool {
+pub(crate) fn is_on_clear_line(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
     let most = (near.len() as f64 * CLEAR_SHARE).ceil() as usize;
     if near.len() < ON_CLEAR_LINE {
         return false;
     }
-    near.sort_by(|a, b| b.norm_squared().total_cmp(&a.norm_squared()));
-    near[..N_LINES]
-        .iter()
+    first_of(near.iter(), N_LINES, |v| -v.norm_squared())
+        .into_iter()
         .map(|v| v.normalize())
         .any(|unit| n_along(near, &unit) >= most.max(ON_CLEAR_LINE) && is_across(&unit, here, eyes))
 }
@@ -71,10 +70,9 @@ pub(crate) fn is_on_clear_line(near: &mut [Offset], here: &Point, eyes: &[Point]
 /// Whether the origin, which is at `here`, lies on a long line that does not follow a beam, with
 /// little beside it: on a wire that few beams met.
 pub(crate) fn is_on_long_line(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
-    let mut nearest: Vec<&Offset> =
-        near.iter().filter(|v| v.norm() > 2.0 * LINE_THICKNESS).collect();
-    nearest.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
-    nearest.iter().take(N_DIRECTIONS).map(|v| v.normalize()).any(|unit| {
+    let apart = near.iter().filter(|v| v.norm() > 2.0 * LINE_THICKNESS);
+    let nearest = first_of(apart, N_DIRECTIONS, |v| v.norm_squared());
+    nearest.into_iter().map(|v| v.normalize()).any(|unit| {
         let (mut n, mut n_beside) = (0_usize, 0_usize);
         let mut stretches = Vec::new();
         for w in near {
@@ -154,6 +152,25 @@ fn is_on_bar_within(reach: f32, near: &[Offset], here: &Point, eyes: &[Point]) -
         && near.iter().filter(|v| off(**v - middle) < BAR_RADIUS).count() >= most
         && is_across(&along, here, eyes)
         && eyes.iter().all(is_flat)
+}
+
+/// The first `n` places by a key, as a stable sort has them.
+fn first_of<'a>(
+    all: impl Iterator<Item = &'a Offset>,
+    n: usize,
+    key: impl Fn(&Offset) -> f32,
+) -> Vec<&'a Offset> {
+    let mut first: Vec<(f32, &Offset)> = Vec::with_capacity(n + 1);
+    for v in all {
+        let own = key(v);
+        let is_first = first.len() < n || first.last().is_some_and(|(last, _)| own < *last);
+        if is_first {
+            let at = first.partition_point(|(other, _)| *other <= own);
+            first.insert(at, (own, v));
+            first.truncate(n);
+        }
+    }
+    first.into_iter().map(|(_, v)| v).collect()
 }
 
 /// Whether a direction leads across all beams to a place.
