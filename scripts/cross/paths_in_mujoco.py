@@ -27,7 +27,6 @@ Needs mujoco, open3d, scipy and numpy.
 """
 
 import argparse
-import csv
 import json
 import subprocess
 import sys
@@ -40,6 +39,7 @@ import open3d as o3d
 from scipy.spatial import ConvexHull, cKDTree
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+from figures import Figures  # noqa: E402
 from mesh_quality import read_las  # noqa: E402
 
 # Largest step between compared postures, radians or metres: 16 mm at a reach of 2 m.
@@ -299,7 +299,7 @@ def checked(args, out, robot, names, start, goals):
         return json.loads(call(*command, codes=(0, 1, 3)))["paths"]
 
 
-def paths(args, out, robot, wanted, draw, points, writer):
+def paths(args, out, robot, wanted, draw, points, figures):
     plant = Plant(args.program, out, args.bound, robot["id"])
     names = list(robot["joints"])
     at, start, drawn = goals(plant, robot, names, draw, DRAWS * wanted)
@@ -329,11 +329,7 @@ def paths(args, out, robot, wanted, draw, points, writer):
             "differs": cause(said[k], nearest, links, args.bound),
             "pins_gape_mm": round(gaped * 1e3, 4),
         }  # fmt: skip
-        if writer.fieldnames is None:
-            writer.fieldnames = list(row)
-            writer.writeheader()
-        writer.writerow(row)
-        args.csv.flush()
+        figures.add(row)
     counts = {outcome: outcomes.count(outcome) for outcome in sorted(set(outcomes))}
     print(f"{out} {robot['id']}: {len(taken)} taken of {counts}", file=sys.stderr)
 
@@ -349,7 +345,7 @@ def main():
     args = parser.parse_args()
     args.program = args.program.resolve()
     draw = np.random.default_rng(args.seed)
-    writer = csv.DictWriter(args.csv, None)
+    figures = Figures(args.csv)
     robots = []
     for out in map(Path.resolve, args.out):
         found = json.load(open(out / "result.json"))["robots"]
@@ -361,7 +357,7 @@ def main():
             stands = [~np.isin(kinds, MOVING) for _, kinds in tiles]
             xyz, kinds = (np.concatenate([t[i][own] for t, own in zip(tiles, stands)]) for i in (0, 1))
             points = cKDTree(xyz), kinds
-        paths(args, out, robot, -(-args.paths // len(robots)), draw, points, writer)
+        paths(args, out, robot, -(-args.paths // len(robots)), draw, points, figures)
 
 
 main()

@@ -86,7 +86,7 @@ impl Front {
         is_passed
     }
 
-    /// Whether a cell holds directions, which are as long as 1: about a third of the 27 about one do
+    /// Whether a cell holds directions, which are as long as 1: about half of the 27 about one do
     /// not, and are not worth a look.
     fn is_of_directions(&self, cell: &[i32; 3]) -> bool {
         let (mut low, mut high) = (0.0, 0.0);

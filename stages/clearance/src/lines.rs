@@ -120,9 +120,9 @@ fn is_on_plane_within(reach: f32, near: &[Offset], here: &Point, eyes: &[Point])
         && eyes.iter().all(is_faced)
 }
 
-/// Whether most of the points near the origin, which is at `here`, lie on one bar with it, such as a
-/// pipe, that does not follow a beam and is no deeper along the beams than the half of a pipe that
-/// they meet: a curtain behind an edge is as deep as what the edge hides.
+/// Whether most points near the origin, which is at `here`, lie on one bar with it, such as a pipe,
+/// that does not follow a beam and is no deeper along the beams than the half of a pipe that they
+/// meet: a curtain behind an edge is as deep as what the edge hides.
 pub(crate) fn is_on_clear_bar(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
     BAR_REACHES.iter().any(|reach| is_on_bar_within(*reach, near, here, eyes))
 }
