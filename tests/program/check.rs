@@ -175,7 +175,8 @@ fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
     assert!(hits.iter().all(|p| p["outcome"] != "free"), "{hits:?}");
     assert!(free.iter().all(|p| p["outcome"] == "free"), "{free:?}");
 
-    // Of points of still things hardly any are dropped, of strays behind edges many.
+    // Of points of still things hardly any are dropped, of strays behind edges many: what may be a
+    // wire or a pipe is kept with the strays beside it.
     let points = row["points"].as_object().expect("counts");
     let sum = |strays: bool, what: &str| -> u64 {
         let own = points.iter().filter(|(name, _)| (*name == "strays") == strays);
@@ -183,5 +184,5 @@ fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
     };
     assert!(sum(false, "n") > 20_000 && sum(true, "n") > 50, "{points:?}");
     assert!(1000 * sum(false, "n_dropped") < sum(false, "n"), "{points:?}");
-    assert!(5 * sum(true, "n_dropped") > 2 * sum(true, "n"), "{points:?}");
+    assert!(3 * sum(true, "n_dropped") > sum(true, "n"), "{points:?}");
 }
