@@ -21,6 +21,7 @@ cause is one of these, or the path is a fault:
               distance (half a step, the ball of a cell) and the bound of the mesh allow
     as found  `check` lists the link as no nearer than as found: most points beside a link are its
               own and move with it, and the mesh has them as fixed
+    touching  all links that hit something touch a piece as found, and pairs that do are left out
     beside    what it hits are not fixed points, but uncertain ones or another robot
 
 Needs mujoco, open3d, scipy and numpy.
@@ -113,6 +114,7 @@ class Plant:
         }
         self.links = [name(mujoco.mjtObj.mjOBJ_BODY, model.geom_bodyid[g]) for g in range(model.ngeom)]
         self.pieces = [name(mujoco.mjtObj.mjOBJ_GEOM, g) for g in range(model.ngeom)]
+        self.robot = f"{robot}/"
         self.touching = {}
         for pair, depth, _ in list(self.contacts()):
             if depth > 0:
@@ -125,14 +127,14 @@ class Plant:
         self.mesh.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(fixed))
 
     def contacts(self):
-        """Pairs of a robot and what is not its own up to LOOKED apart: names, depth, contact."""
+        """Pairs of the robot and what is not its own up to LOOKED apart: names, depth, contact."""
         self.data.qpos[:] = self.qpos
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
         for k in range(self.data.ncon):
             contact = self.data.contact[k]
             links = [self.links[g] for g in contact.geom]
-            if links[0].split("/")[0] == links[1].split("/")[0]:
+            if sum(link.startswith(self.robot) for link in links) != 1:
                 continue
             pair = tuple(self.pieces[g] or link for g, link in zip(contact.geom, links))
             if -contact.dist > self.touching.get(pair, -1.0) + DEEPER:
@@ -255,7 +257,7 @@ class Plant:
         return nearest, links, gaped
 
 
-def cause(said, nearest, links, bound):
+def cause(said, nearest, links, touching, bound):
     """Why a path differs; empty where it does not."""
     depth, own = nearest["depth"], links["depth"]
     if (said["outcome"] == "blocked") == (depth > 0):
@@ -269,6 +271,8 @@ def cause(said, nearest, links, bound):
     hits = [c for c in said["contacts"] if c["level"] in ("hit", "inside") and not c["as_found"]]
     if all(c["what"] not in ("fixed", "floor") for c in hits):
         return "beside"
+    if all(c["link"] in touching for c in hits if c["what"] in ("fixed", "floor")):
+        return "touching"
     return "grazed" if own > -(ADDED + bound) else "fault"
 
 
@@ -306,6 +310,7 @@ def paths(args, out, robot, wanted, draw, points, figures):
     own = [at for name, at in plant.joints.items() if name.startswith(f"{robot['id']}/")]
     said = checked(args, out, robot, names, start, drawn)
     outcomes = [path["outcome"] for path in said]
+    touching = {link.split("/")[-1] for pair in plant.touching for link in pair if "/" in link}
     taken = []
     for outcome in ("free", "blocked"):
         able = [k for k, path in enumerate(said) if path["outcome"] == outcome and not path["impossible"]]
@@ -326,7 +331,7 @@ def paths(args, out, robot, wanted, draw, points, figures):
             "there_from_mesh_mm": mm(links["from"][1]) if links["from"] else "",
             "there_class": links["from"][2] if links["from"] else "",
             "check_hits": "; ".join(sorted({f"{c['link']} {c['what']}" for c in hits}))[:120],
-            "differs": cause(said[k], nearest, links, args.bound),
+            "differs": cause(said[k], nearest, links, touching, args.bound),
             "pins_gape_mm": round(gaped * 1e3, 4),
         }  # fmt: skip
         figures.add(row)
