@@ -16,7 +16,6 @@ numpy, open3d and pye57.
 """
 
 import argparse
-import csv
 import json
 import random
 import shutil
@@ -31,6 +30,7 @@ import open3d as o3d
 import pye57
 
 sys.path.insert(0, str(Path(__file__).parent))
+from figures import Figures  # noqa: E402
 from mesh_quality import distances, share_in_free, spaces  # noqa: E402
 
 # Suites of `bench plant` and how many scanners stay.
@@ -180,7 +180,7 @@ def measured(mesh, bound, truth):
     return out
 
 
-def cell(args, k, writer):
+def cell(args, k, figures):
     suite, n_scanners = SUITES[k % len(SUITES)]
     draw = random.Random(args.seed * 1000 + k)
     dir = args.work / f"cell-{k}"
@@ -222,11 +222,7 @@ def cell(args, k, writer):
             "deeper_than_5_mm_percent": round(100 * share_in_free(mesh, grids, depth=DEEP), 3),
             "processor_s": round(cpu, 1), "wall_s": round(wall, 1), "peak_mib": round(peak),
         }  # fmt: skip
-        if writer.fieldnames is None:
-            writer.fieldnames = list(row)
-            writer.writeheader()
-        writer.writerow(row)
-        args.csv.flush()
+        figures.add(row)
     if not args.keep:
         shutil.rmtree(dir)
 
@@ -248,9 +244,9 @@ def main():
     demo = args.work / "demo"
     if not demo.exists():
         child([args.program, "demo", "--out", demo, "--progress", "none"])
-    writer = csv.DictWriter(args.csv, None)
+    figures = Figures(args.csv)
     for k in range(args.first, args.first + args.cells):
-        cell(args, k, writer)
+        cell(args, k, figures)
 
 
 if __name__ == "__main__":

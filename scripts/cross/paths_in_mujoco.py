@@ -6,14 +6,28 @@
 
 Robots are those of `export --to mjcf`; what stands still is the convex pieces of
 `export --to mesh --convex`, which replace the scene's boxes and floor. Paths begin in the posture
-that was found and go straight to a drawn one, until there are as many as wanted that `check` calls
-free or blocked, half of each where they can be had. Pairs that touch in the found posture, and
-parts of one robot, do not count. Joints that follow or close loops are solved in each posture.
-Needs mujoco and numpy.
+that was found and go straight to a drawn one; of each robot as many are taken that `check` calls
+free as blocked, where they can be had. Parts of one robot do not count, nor do pairs that touch in
+the found posture and go no deeper. Joints that follow or close loops are solved in each posture.
+
+A path differs if `check` calls it free and something touches, or blocked and nothing does. The
+cause is one of these, or the path is a fault:
+
+    hull      MuJoCo collides the hull of a link; the link's own triangles, in the same postures,
+              keep out of all pieces
+    margin    the link enters a piece, but is farther than the margin of `check` from all points:
+              the piece stands out from the points by that much
+    grazed    `check` calls it blocked, and the piece is as near to the link as what it adds to the
+              distance (half a step, the ball of a cell) and the bound of the mesh allow
+    as found  `check` lists the link as no nearer than as found: most points beside a link are its
+              own and move with it, and the mesh has them as fixed
+    touching  all links that hit something touch a piece as found, and pairs that do are left out
+    beside    what it hits are not fixed points, but uncertain ones or another robot
+
+Needs mujoco, open3d, scipy and numpy.
 """
 
 import argparse
-import csv
 import json
 import subprocess
 import sys
@@ -22,12 +36,29 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import open3d as o3d
+from scipy.spatial import ConvexHull, cKDTree
 
-# Largest step between compared postures, radians or metres.
-STEP = 0.02
-# Most paths drawn for each that is wanted.
-DRAWS = 12
+sys.path.insert(0, str(Path(__file__).parent.parent))
+from figures import Figures  # noqa: E402
+from mesh_quality import read_las  # noqa: E402
+
+# Largest step between compared postures, radians or metres: 16 mm at a reach of 2 m.
+STEP = 0.008
+# Paths drawn for each that is wanted.
+DRAWS = 16
 MARGIN = 0.02
+# By how much `check` brings a link nearer to a point: half a step of a path of 10 mm, and the ball
+# about a cell of 4 mm in which the point lies anywhere.
+ADDED = 0.005 + 2 * 0.00347
+# Distance up to which MuJoCo tells gaps, metres.
+LOOKED = 0.035
+# How much deeper than as found a pair must go to touch anew, metres.
+DEEPER = 0.001
+# Mean distance between places on a link that are compared with a piece, metres.
+SPACING = 0.003
+# LAS classes of points of robots and of what hangs on them.
+MOVING = (65, 66)
 
 
 def call(*args, codes=(0,)):
@@ -53,8 +84,7 @@ class Plant:
 
     def __init__(self, program, out, bound, robot):
         quiet = ["--progress", "none"]
-        call(program, "export", out, "--to", "mjcf", *quiet)
-        mesh = ["--to", "mesh", "--convex", "--bound", bound, "--robot", robot]
+        mesh = ["--to", "mesh", "--mesh-format", "ply", "--convex", "--bound", bound, "--robot", robot]
         call(program, "export", out, *mesh, *quiet)
         spec = mujoco.MjSpec.from_file(str(out / "export/mjcf/plant.xml"))
         plant = spec.body("plant")
@@ -65,14 +95,14 @@ class Plant:
                 spec.delete(body)
         for geom in list(plant.geoms):
             spec.delete(geom)
-        found = pieces(out / "export/mesh/convex.obj")
-        for k, corners in enumerate(found):
+        self.corners = pieces(out / "export/mesh/convex.obj")
+        for k, corners in enumerate(self.corners):
             middle = corners.mean(axis=0)
             near = (corners - middle).astype(np.float32)
             spec.add_mesh(name=f"piece_{k}", uservert=near.flatten())
             own = plant.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"piece_{k}")
-            own.name, own.pos, own.mass = f"piece_{k}", middle, 0
-        self.n_pieces = len(found)
+            own.name, own.pos, own.mass, own.margin = f"piece_{k}", middle, 0, LOOKED
+        self.n_pieces = len(self.corners)
         spec.memory = 1 << 29
         self.model = model = spec.compile()
         self.data = mujoco.MjData(model)
@@ -84,22 +114,77 @@ class Plant:
         }
         self.links = [name(mujoco.mjtObj.mjOBJ_BODY, model.geom_bodyid[g]) for g in range(model.ngeom)]
         self.pieces = [name(mujoco.mjtObj.mjOBJ_GEOM, g) for g in range(model.ngeom)]
-        self.touching = set()
-        self.touching = {pair for pair, _ in self.contacts()}
+        self.robot = f"{robot}/"
+        self.touching = {}
+        for pair, depth, _ in list(self.contacts()):
+            if depth > 0:
+                self.touching[pair] = max(depth, self.touching.get(pair, 0.0))
+        self.places, self.trees, self.hulls = {}, {}, {}
+        self.mesh = o3d.t.geometry.RaycastingScene()
+        fixed = o3d.io.read_triangle_mesh(str(out / "export/mesh/fixed.ply"))
+        self.middle = np.asarray(fixed.vertices).mean(axis=0)
+        fixed.translate(-self.middle)
+        self.mesh.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(fixed))
 
     def contacts(self):
-        """Contacts of a robot with what is not its own: names and depth, metres."""
+        """Pairs of the robot and what is not its own up to LOOKED apart: names, depth, contact."""
         self.data.qpos[:] = self.qpos
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_collision(self.model, self.data)
         for k in range(self.data.ncon):
             contact = self.data.contact[k]
             links = [self.links[g] for g in contact.geom]
-            if links[0].split("/")[0] == links[1].split("/")[0]:
+            if sum(link.startswith(self.robot) for link in links) != 1:
                 continue
             pair = tuple(self.pieces[g] or link for g, link in zip(contact.geom, links))
-            if pair not in self.touching:
-                yield pair, -contact.dist
+            if -contact.dist > self.touching.get(pair, -1.0) + DEEPER:
+                yield pair, -contact.dist, contact
+
+    def surface(self, geom):
+        """Places on the triangles of a geom, in its own frame."""
+        if geom not in self.places:
+            model, mesh = self.model, self.model.geom_dataid[geom]
+            first, n = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+            vertices = model.mesh_vert[first : first + n]
+            first, n = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+            triangles = o3d.utility.Vector3iVector(model.mesh_face[first : first + n])
+            own = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), triangles)
+            o3d.utility.random.seed(1)
+            drawn = own.sample_points_uniformly(int(own.get_surface_area() / SPACING**2) + 1)
+            self.places[geom] = np.concatenate([vertices, np.asarray(drawn.points)])
+            self.trees[geom] = cKDTree(self.places[geom])
+        return self.places[geom]
+
+    def own_depth(self, geoms):
+        """How deep a link's own triangles are in a piece, and where; negative outside."""
+        names = [self.pieces[g] or "" for g in geoms]
+        own = next((k for k, name in enumerate(names) if name.startswith("piece_")), None)
+        if own is None:
+            return None
+        piece, geom = int(names[own].split("_")[1]), geoms[1 - own]
+        if piece not in self.hulls:
+            self.hulls[piece] = ConvexHull(self.corners[piece]).equations
+        planes, places = self.hulls[piece], self.surface(geom)
+        turn, at = self.data.geom_xmat[geom].reshape(3, 3), self.data.geom_xpos[geom]
+        corners = self.corners[piece]
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        far = np.linalg.norm(corners - middle, axis=1).max() + LOOKED
+        near = self.trees[geom].query_ball_point((middle - at) @ turn, far)
+        if not near:
+            return -LOOKED, at
+        places = places[near]
+        above = np.full(len(places), -np.inf)
+        for plane in planes:
+            above = np.maximum(above, places @ (turn.T @ plane[:3]) + (at @ plane[:3] + plane[3]))
+        deepest = np.argmin(above)
+        return float(-above[deepest]), turn @ places[deepest] + at
+
+    def distances(self, place, points):
+        """How far a place is from all points and from the mesh, metres; class of the point."""
+        near = (place - self.middle).astype(np.float32)[None]
+        from_mesh = float(self.mesh.compute_distance(near).numpy()[0])
+        off, at = points[0].query(place)
+        return float(off), from_mesh, int(points[1][at])
 
     def follow(self, own, driven):
         """Moves followers of one robot, and joints of its loops until their pins meet."""
@@ -139,77 +224,119 @@ class Plant:
             qpos[free] -= np.linalg.lstsq(jacobian, off, rcond=1e-9)[0]
         return float(np.abs(gaps()).max())
 
-    def run(self, at, start, goal, own):
-        """Deepest contact along a path, what touches there, and how far pins gaped."""
+    def run(self, at, start, goal, own, points):
+        """What comes nearest along a path: of MuJoCo's bodies, and of the links' own triangles in
+        the same pieces; and how far pins gaped."""
         n = max(2, int(np.ceil(np.abs(goal - start).max() / STEP)) + 1)
-        deepest, gaped = (0.0, None, 0.0), 0.0
+        nearest = {"depth": -LOOKED, "pair": None, "at": 0.0}
+        links = {"depth": -LOOKED, "from": None, "link": ""}
+        gaped = 0.0
         self.qpos = self.start.copy()
         for share in np.linspace(0.0, 1.0, n):
             self.qpos[at] = start + share * (goal - start)
             gaped = max(gaped, self.follow(own, set(at)))
-            for pair, depth in self.contacts():
-                if deepest[1] is None or depth > deepest[0]:
-                    deepest = (depth, pair, share)
-        return deepest, gaped
+            found = {}
+            for pair, depth, contact in self.contacts():
+                if depth > nearest["depth"]:
+                    nearest = {"depth": depth, "pair": pair, "at": share}
+                found[tuple(contact.geom)] = max(depth, found.get(tuple(contact.geom), -LOOKED))
+            # Own triangles lie within the hull.
+            for geoms, depth in sorted(found.items(), key=lambda pair: -pair[1]):
+                if depth <= links["depth"]:
+                    break
+                inside = self.own_depth(geoms)
+                if inside is None:
+                    links = {"depth": depth, "from": None, "link": ""}
+                elif min(inside[0], depth) > links["depth"]:
+                    own_link = next(self.links[g] for g in geoms if self.links[g] != "plant")
+                    links = {
+                        "depth": min(inside[0], depth),
+                        "from": self.distances(inside[1], points),
+                        "link": own_link.split("/")[-1],
+                    }
+        return nearest, links, gaped
 
 
-def paths(args, out, wanted, draw, writer):
-    result = json.load(open(out / "result.json"))
-    trusted = [r for r in result["robots"] if r["verdict"] == "trusted" and r.get("space")]
-    counts = {"free": 0, "blocked": 0}
-    per_robot = -(-wanted // max(len(trusted), 1))
-    for robot in trusted:
-        plant = Plant(args.program, out, args.bound, robot["id"])
-        names = list(robot["joints"])
-        at = np.array([plant.joints[f"{robot['id']}/{name}"] for name in names])
-        own = [at for name, at in plant.joints.items() if name.startswith(f"{robot['id']}/")]
-        start = plant.start[at]
-        ranges = []
-        for name in names:
-            j = mujoco.mj_name2id(plant.model, mujoco.mjtObj.mjOBJ_JOINT, f"{robot['id']}/{name}")
-            has = plant.model.jnt_limited[j]
-            ranges.append(plant.model.jnt_range[j] if has else [-np.pi, np.pi])
-        low, high = np.array(ranges).T
-        done = {"free": 0, "blocked": 0}
-        for _ in range(DRAWS * per_robot):
-            if sum(done.values()) >= per_robot:
-                break
-            far = draw.uniform(0.05, 1.0) * np.minimum(high - low, 2.0)
-            goal = np.clip(start + draw.uniform(-0.5, 0.5, len(at)) * far, low, high)
-            goal = np.clip(goal, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
-            with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
-                file.write(",".join(names) + "\n")
-                for posture in (start, goal):
-                    file.write(",".join(repr(float(v)) for v in posture) + "\n")
-                file.flush()
-                command = [args.program, "check", out, "--trajectory", file.name, "--json"]
-                command += ["--robot", robot["id"], "--margin", MARGIN, "--progress", "none"]
-                said = json.loads(call(*command, codes=(0, 1, 3)))
-            outcome = said["outcome"]
-            if outcome not in done or said["impossible"]:
-                counts[outcome] = counts.get(outcome, 0) + 1
-                continue
-            if done[outcome] >= -(-per_robot // 2):
-                continue
-            done[outcome] += 1
-            counts[outcome] += 1
-            (depth, pair, share), gaped = plant.run(at, start, goal, own)
-            hits = [c for c in said["contacts"] if c["level"] in ("hit", "inside")]
-            row = {
-                "plant": out.name if out.name != "result" else out.parent.name,
-                "robot": f"{robot['id']} {robot['model']}", "pieces": plant.n_pieces,
-                "check": outcome, "mujoco": "contact" if pair else "none",
-                "deepest_mm": round(depth * 1e3, 1) if pair else "",
-                "between": " and ".join(pair) if pair else "", "at": round(share, 3) if pair else "",
-                "check_says": "; ".join(f"{c['link']} {c['level']} {c['what']}" for c in hits)[:160],
-                "same": (outcome == "blocked") == bool(pair), "pins_gape_mm": round(gaped * 1e3, 4),
-            }  # fmt: skip
-            if writer.fieldnames is None:
-                writer.fieldnames = list(row)
-                writer.writeheader()
-            writer.writerow(row)
-            args.csv.flush()
-        print(f"{out} {robot['id']}: {done}; all draws so far {counts}", file=sys.stderr)
+def cause(said, nearest, links, touching, bound):
+    """Why a path differs; empty where it does not."""
+    depth, own = nearest["depth"], links["depth"]
+    if (said["outcome"] == "blocked") == (depth > 0):
+        return ""
+    if said["outcome"] == "free":
+        if own <= 0:
+            return "hull"
+        if any(c["link"] == links["link"] and c["as_found"] for c in said["contacts"]):
+            return "as found"
+        return "margin" if links["from"] and links["from"][0] >= MARGIN else "fault"
+    hits = [c for c in said["contacts"] if c["level"] in ("hit", "inside") and not c["as_found"]]
+    if all(c["what"] not in ("fixed", "floor") for c in hits):
+        return "beside"
+    if all(c["link"] in touching for c in hits if c["what"] in ("fixed", "floor")):
+        return "touching"
+    return "grazed" if own > -(ADDED + bound) else "fault"
+
+
+def goals(plant, robot, names, draw, n):
+    """Postures at random distances from the one that was found."""
+    at = np.array([plant.joints[f"{robot['id']}/{name}"] for name in names])
+    ranges = []
+    for name in names:
+        j = mujoco.mj_name2id(plant.model, mujoco.mjtObj.mjOBJ_JOINT, f"{robot['id']}/{name}")
+        ranges.append(plant.model.jnt_range[j] if plant.model.jnt_limited[j] else [-np.pi, np.pi])
+    low, high = np.array(ranges).T
+    start = plant.start[at]
+    far = draw.uniform(0.05, 1.0, (n, 1)) * np.minimum(high - low, 4.0)
+    goal = start + draw.uniform(-0.5, 0.5, (n, len(at))) * far
+    return at, start, np.clip(goal, low + 1e-6 * (high - low), high - 1e-6 * (high - low))
+
+
+def checked(args, out, robot, names, start, goals):
+    """What `check` says of each path, in one call."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = []
+        for k, goal in enumerate(goals):
+            rows = [",".join(repr(float(v)) for v in posture) for posture in (start, goal)]
+            files.append(Path(folder) / f"{k}.csv")
+            files[-1].write_text("\n".join([",".join(names), *rows]) + "\n")
+        command = [args.program, "check", out, "--json", "--robot", robot["id"], "--margin", MARGIN]
+        command += ["--progress", "none", "--trajectory", *files]
+        return json.loads(call(*command, codes=(0, 1, 3)))["paths"]
+
+
+def paths(args, out, robot, wanted, draw, points, figures):
+    plant = Plant(args.program, out, args.bound, robot["id"])
+    names = list(robot["joints"])
+    at, start, drawn = goals(plant, robot, names, draw, DRAWS * wanted)
+    own = [at for name, at in plant.joints.items() if name.startswith(f"{robot['id']}/")]
+    said = checked(args, out, robot, names, start, drawn)
+    outcomes = [path["outcome"] for path in said]
+    touching = {link.split("/")[-1] for pair in plant.touching for link in pair if "/" in link}
+    taken = []
+    for outcome in ("free", "blocked"):
+        able = [k for k, path in enumerate(said) if path["outcome"] == outcome and not path["impossible"]]
+        taken += able[: -(-wanted // 2)]
+    for k in sorted(taken):
+        nearest, links, gaped = plant.run(at, start, drawn[k], own, points)
+        hits = [c for c in said[k]["contacts"] if c["level"] in ("hit", "inside") and not c["as_found"]]
+        mm = lambda v: f"< {-LOOKED * 1e3:.0f}" if v <= -LOOKED else round(v * 1e3, 1)
+        row = {
+            "plant": out.name if out.name not in ("result", "out") else out.parent.name,
+            "robot": f"{robot['id']} {robot['model']}", "pieces": plant.n_pieces,
+            "bound_mm": mm(args.bound), "margin_mm": mm(MARGIN),
+            "check": outcomes[k], "mujoco": "contact" if nearest["depth"] > 0 else "none",
+            "depth_mm": mm(nearest["depth"]), "between": " and ".join(nearest["pair"] or ()),
+            "at": round(nearest["at"], 3) if nearest["pair"] else "",
+            "links_own_depth_mm": mm(links["depth"]),
+            "there_from_points_mm": mm(links["from"][0]) if links["from"] else "",
+            "there_from_mesh_mm": mm(links["from"][1]) if links["from"] else "",
+            "there_class": links["from"][2] if links["from"] else "",
+            "check_hits": "; ".join(sorted({f"{c['link']} {c['what']}" for c in hits}))[:120],
+            "differs": cause(said[k], nearest, links, touching, args.bound),
+            "pins_gape_mm": round(gaped * 1e3, 4),
+        }  # fmt: skip
+        figures.add(row)
+    counts = {outcome: outcomes.count(outcome) for outcome in sorted(set(outcomes))}
+    print(f"{out} {robot['id']}: {len(taken)} taken of {counts}", file=sys.stderr)
 
 
 def main():
@@ -223,9 +350,19 @@ def main():
     args = parser.parse_args()
     args.program = args.program.resolve()
     draw = np.random.default_rng(args.seed)
-    writer = csv.DictWriter(args.csv, None)
-    for out in args.out:
-        paths(args, out.resolve(), -(-args.paths // len(args.out)), draw, writer)
+    figures = Figures(args.csv)
+    robots = []
+    for out in map(Path.resolve, args.out):
+        found = json.load(open(out / "result.json"))["robots"]
+        robots += [(out, r) for r in found if r["verdict"] == "trusted" and r.get("space")]
+    for k, (out, robot) in enumerate(robots):
+        if k == 0 or out != robots[k - 1][0]:
+            call(args.program, "export", out, "--to", "mjcf", "--progress", "none")
+            tiles = [read_las(path) for path in sorted((out / "tiles").glob("*.las"))]
+            stands = [~np.isin(kinds, MOVING) for _, kinds in tiles]
+            xyz, kinds = (np.concatenate([t[i][own] for t, own in zip(tiles, stands)]) for i in (0, 1))
+            points = cKDTree(xyz), kinds
+        paths(args, out, robot, -(-args.paths // len(robots)), draw, points, figures)
 
 
 main()

@@ -1,10 +1,11 @@
-//! Checks a path of a robot of a result: where it comes near to scanned surfaces, to other robots,
-//! or to space that no scan has seen.
+//! Checks paths of robots of a result: where they come near to scanned surfaces, to other
+//! robots, or to space that no scan has seen.
 //!
 //! In doubt a path is not free: uncertain points count as obstacles like fixed ones, and space
 //! without beams is not free. Contacts that exist already in the found posture are reported
 //! separately.
 
+mod outlines;
 mod report;
 mod strays;
 mod subject;
@@ -15,28 +16,53 @@ mod words;
 
 pub use report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
 pub(crate) use strays::stray_points;
+pub use words::{json, words};
 
 use crate::cache::VerifiedFiles;
-use crate::engine::{Engine, Task};
+use crate::engine::{Amount, Engine, Task};
 use crate::job::{Job, Means};
 use crate::result::plant_state::PlantState;
 use clearance::{Contacts, Obstacles, PathWalk, RobotBody};
 use contract::{Error, Fit, Kind, Result, Verdict};
 use export::ResultFile;
+use outlines::Outlines;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use subject::CheckedRobot;
 use surrounded::{reported_robots, surrounded};
 use surroundings::Surroundings;
 use trajectory::Trajectory;
 
-/// Checks a path.
+/// Checks paths: the reports, in the order of the request. What stands around a robot is gathered
+/// once for all of its paths.
 ///
 /// # Errors
-/// There is no result or it lacks files for this, the path does not belong to the robot, or files
+/// There is no result or it lacks files for this, a path does not belong to its robot, or files
 /// cannot be read.
-pub fn check(request: &CheckRequest, means: &Means, engine: &Engine) -> Result<PathReport> {
-    let path = Trajectory::read(&request.trajectory, means.settings.ingest.max_text_bytes)?;
-    let choose = |result: &ResultFile, state: &PlantState| chosen(request, result, state, &path);
-    at_robot(request, choose, means, engine, |place| place.check_path(&path, engine))
+pub fn check(request: &CheckRequest, means: &Means, engine: &Engine) -> Result<Vec<PathReport>> {
+    let files = &request.trajectories;
+    let paths = trajectory::read_all(files, means.settings.ingest.max_text_bytes)?;
+    let choose = |result: &ResultFile, state: &PlantState| {
+        let one = |(path, file): (&Trajectory, &PathBuf)| {
+            chosen(request, result, state, path).map_err(|e| e.at(file.display()))
+        };
+        paths.iter().zip(files).map(one).collect()
+    };
+    // A stage for each of many paths would say little.
+    let quiet = (paths.len() > 1).then(|| engine.quiet());
+    let engine_of_paths = quiet.as_ref().unwrap_or(engine);
+    at_robots(request, choose, means, engine, |place, own| {
+        let total = Amount::items(own.len() as u64);
+        let stage = quiet.is_some().then(|| engine.progress.stage("paths", total));
+        let one = |&at: &usize| {
+            let report = place.check_path(&paths[at], engine_of_paths);
+            let mut report = report.map_err(|e| e.at(files[at].display()))?;
+            report.trajectory.clone_from(&files[at]);
+            stage.iter().for_each(|stage| stage.add(1, 0, 0));
+            Ok(report)
+        };
+        own.iter().map(one).collect()
+    })
 }
 
 /// A robot of a result with its surroundings, for checking several paths.
@@ -51,18 +77,20 @@ pub(crate) struct RobotSite<'a> {
     is_partial: bool,
 }
 
-/// Opens the result, selects a robot with `choose` and calls `then` with it and its surroundings.
+/// Opens the result, selects a robot for each item with `choose`, and calls `then` once for each
+/// selected robot with its surroundings and the indices of its items; what `then` returns for them,
+/// in the order of the items.
 ///
 /// # Errors
 /// There is no result or it lacks files for this, files cannot be read, or an error of `choose` or
 /// `then`.
-pub(crate) fn at_robot<T>(
+pub(crate) fn at_robots<T>(
     request: &CheckRequest,
-    choose: impl FnOnce(&ResultFile, &PlantState) -> Result<usize>,
+    choose: impl FnOnce(&ResultFile, &PlantState) -> Result<Vec<usize>>,
     means: &Means,
     engine: &Engine,
-    then: impl FnOnce(&RobotSite<'_>) -> Result<T>,
-) -> Result<T> {
+    mut then: impl FnMut(&RobotSite<'_>, &[usize]) -> Result<Vec<T>>,
+) -> Result<Vec<T>> {
     let out = &request.out;
     // No run can use a result that was copied without its store.
     let _lock = out.join("store").is_dir().then(|| Job::hold_shared(out)).transpose()?;
@@ -75,7 +103,10 @@ pub(crate) fn at_robot<T>(
         .at(out.display())
         .hint("run the same job again"));
     }
-    let number = choose(&result, &state)?;
+    let mut items: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (item, robot) in choose(&result, &state)?.into_iter().enumerate() {
+        items.entry(robot).or_default().push(item);
+    }
     let library = request.robots.as_deref();
     let (fits, models) = reported_robots(library, &state, means, engine)?;
     let robots: Vec<CheckedRobot<'_>> = (fits.iter())
@@ -85,20 +116,28 @@ pub(crate) fn at_robot<T>(
         })
         .collect();
     robots.iter().try_for_each(|robot| robot.is_of_the_library(files.manifest()))?;
-    let robot = robots.iter().find(|robot| robot.number == number);
-    let robot = robot.ok_or_else(|| Error::new(Kind::Bug, "the selected robot has no fit"))?;
-    let around = Surroundings { out, files: &files, state: &state, result: &result };
-    let others: Vec<(usize, &Fit)> =
-        fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
-    let (body, obstacles) = surrounded(robot, &around, &others, &models, request.margin, engine)?;
-    then(&RobotSite {
-        request,
-        robot,
-        body,
-        obstacles,
-        ids: result.robots.iter().map(|r| r.id.clone()).collect(),
-        is_partial: files.manifest().partial,
-    })
+    let outlines = Outlines::default();
+    let around = Surroundings { out, files: &files, state: &state, result: &result, outlines };
+    let mut all: Vec<(usize, T)> = Vec::new();
+    for (number, items) in items {
+        let robot = robots.iter().find(|robot| robot.number == number);
+        let robot = robot.ok_or_else(|| Error::new(Kind::Bug, "the selected robot has no fit"))?;
+        let others: Vec<(usize, &Fit)> =
+            fits.iter().filter(|(at, _)| *at != number).map(|(at, fit)| (*at, fit)).collect();
+        let (body, obstacles) =
+            surrounded(robot, &around, &others, &models, request.margin, engine)?;
+        let site = RobotSite {
+            request,
+            robot,
+            body,
+            obstacles,
+            ids: result.robots.iter().map(|r| r.id.clone()).collect(),
+            is_partial: files.manifest().partial,
+        };
+        all.extend(items.iter().copied().zip(then(&site, &items)?));
+    }
+    all.sort_by_key(|(item, _)| *item);
+    Ok(all.into_iter().map(|(_, one)| one).collect())
 }
 
 impl RobotSite<'_> {

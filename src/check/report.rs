@@ -4,20 +4,20 @@ use clearance::Contact;
 use geometry::{Point, Pose};
 use std::path::PathBuf;
 
-/// Request of a path check.
+/// Request of a check of paths.
 #[derive(Debug, Clone)]
 pub struct CheckRequest {
     /// Output folder of the run whose result is used.
     pub out: PathBuf,
-    /// File of the path.
-    pub trajectory: PathBuf,
-    /// Id of the robot; `None` for the only robot that has all joints of the path.
+    /// Files of the paths.
+    pub trajectories: Vec<PathBuf>,
+    /// Id of the robot of all paths; `None` for the only robot that has all joints of a path.
     pub robot: Option<String>,
     /// Folder of the robot library, if it has moved since the run.
     pub robots: Option<PathBuf>,
     /// Distance below which an obstacle is near, metres.
     pub margin: f64,
-    /// Whether turning joints of the path are given in degrees.
+    /// Whether turning joints of the paths are given in degrees.
     pub degrees: bool,
 }
 
@@ -51,6 +51,8 @@ pub enum PathDoubt {
 
 /// Report of a path check.
 pub struct PathReport {
+    /// File of the path.
+    pub trajectory: PathBuf,
     /// Id of the robot.
     pub robot: String,
     /// Names of its links.

@@ -1,6 +1,7 @@
 //! Points of a result that are no obstacles for `check`: they are no evidence of an
 //! object, or lie on a robot. What is made for planners leaves them out by the same rule.
 
+use super::outlines::Outlines;
 use super::subject::CheckedRobot;
 use super::surrounded::{reported_robots, surrounded};
 use super::surroundings::Surroundings;
@@ -25,7 +26,7 @@ pub(crate) fn stray_points(
     engine: &Engine,
 ) -> Result<StrayPoints> {
     let (fits, models) = reported_robots(library, state, means, engine)?;
-    let around = Surroundings { out, files, state, result };
+    let around = Surroundings { out, files, state, result, outlines: Outlines::default() };
     let mut all = Vec::new();
     for (number, fit) in &fits {
         let (entry, model) = (&result.robots[*number], &models[fit.model]);

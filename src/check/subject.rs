@@ -8,6 +8,7 @@ use clearance::{Contact, ContactLevel, Contacts, Leg, ObstacleKind};
 use contract::{Error, Fit, JointFit, Result, Verdict};
 use export::{RobotEntry, mesh_files};
 use robot::{JointKind, Model};
+use std::path::PathBuf;
 
 /// Greatest gap of a closed loop that counts as closed, metres: less than a scanner resolves.
 const LOOP_GAP: f64 = 1e-4;
@@ -180,6 +181,7 @@ impl CheckedRobot<'_> {
             PathOutcome::Unknown
         };
         PathReport {
+            trajectory: PathBuf::new(),
             robot: self.entry.id.clone(),
             links: self.entry.links.clone(),
             world_from_base: self.fit.world_from_base,

@@ -1,6 +1,7 @@
 //! Surroundings of a robot: bodies attached to it, and all obstacles within its reach.
 
 use super::CheckedRobot;
+use super::outlines::{Outlines, ScanShadow};
 use crate::cache::{VerifiedFiles, tiles_of};
 use crate::detect::robots::poses;
 use crate::engine::{AllThreads, Engine, Task};
@@ -19,15 +20,14 @@ use std::path::Path;
 /// Number of points of a tile after which repeated cells are merged.
 const SETTLED: usize = 1 << 22;
 
-/// Distance beyond which scanners contribute few points about a robot, metres.
-const SCANNED_FROM: f64 = 30.0;
-
 /// A result, from whose tiles and spaces surroundings are gathered.
 pub(super) struct Surroundings<'a> {
     pub(super) out: &'a Path,
     pub(super) files: &'a VerifiedFiles,
     pub(super) state: &'a PlantState,
     pub(super) result: &'a ResultFile,
+    /// Shadows that were found already.
+    pub(super) outlines: Outlines,
 }
 
 /// Rules by which points near a robot are sorted to obstacles and attached bodies.
@@ -41,7 +41,7 @@ struct Sorting<'a> {
     /// For each link, whether joints move it.
     moves: &'a [bool],
     /// By LAS `point_source_id`: shadows of robots as seen from the scanners that may have
-    /// measured its points.
+    /// measured its points; world frame.
     shadows: BTreeMap<u16, Vec<&'a Shadow>>,
     /// By LAS `point_source_id`, where it belongs to one scanner: that scanner.
     eyes: BTreeMap<u16, ScannerAt>,
@@ -68,6 +68,7 @@ impl Surroundings<'_> {
     ) -> Result<(AttachedPoints, Obstacles)> {
         let moves = robot.model.moving();
         let base_from_world = &robot.fit.world_from_base.inverse();
+        let shadows = self.outlines.near(robot, others, models, self.state, engine)?;
         let standing = |(number, fit): &(usize, &Fit)| {
             // The robot may return to each posture in which it was scanned.
             let all = std::iter::once(*fit).chain(&fit.stays);
@@ -79,7 +80,6 @@ impl Surroundings<'_> {
             all.map(placed).collect::<Vec<(i16, &Model, Vec<Pose>)>>()
         };
         let others: Vec<_> = others.iter().flat_map(standing).collect();
-        let shadows = self.shadows(robot, &others, engine)?;
         let mut sorting = sorting(robot, far, &moves);
         sorting.shadows = self.shadows_by_source(&shadows);
         sorting.eyes = self.eyes(base_from_world);
@@ -135,35 +135,9 @@ impl Surroundings<'_> {
         Ok((all.cells, hung.collect()))
     }
 
-    /// Shadows of the robots from each known scanner, frame of the base.
-    fn shadows(
-        &self,
-        robot: &CheckedRobot<'_>,
-        others: &[(i16, &Model, Vec<Pose>)],
-        engine: &Engine,
-    ) -> Result<Vec<(usize, Shadow)>> {
-        let own = robot.model.poses(&robot.found());
-        let others = others.iter().map(|(_, model, poses)| (*model, &poses[..]));
-        let all: Vec<(&Model, &[Pose])> =
-            std::iter::once((robot.model, &own[..])).chain(others).collect();
-        let scans = self.state.scans.iter().enumerate();
-        let base = robot.fit.world_from_base.translation.vector;
-        let is_near =
-            |scan: &Scan| (scan.world_from_scan.translation.vector - base).norm() < SCANNED_FROM;
-        let known = scans.filter(|(_, scan)| scan.lattice.is_some() && is_near(scan)).collect();
-        engine.fan_out(Task::new("outlines"), known, |(at, scan)| {
-            let eye = robot.fit.world_from_base.inverse()
-                * Point::from(scan.world_from_scan.translation.vector);
-            Ok((at, Shadow::new(&all, eye)))
-        })
-    }
-
     /// Shadows by the `point_source_id` of points that may lie in them: files with such ids keep
     /// them, others use the number of the scan, from 1.
-    fn shadows_by_source<'s>(
-        &self,
-        shadows: &'s [(usize, Shadow)],
-    ) -> BTreeMap<u16, Vec<&'s Shadow>> {
+    fn shadows_by_source<'s>(&self, shadows: &'s [ScanShadow]) -> BTreeMap<u16, Vec<&'s Shadow>> {
         let mut out: BTreeMap<u16, Vec<&Shadow>> = BTreeMap::new();
         for (at, shadow) in shadows {
             if let Some(id) = self.source_id(*at) {
@@ -193,7 +167,8 @@ impl Surroundings<'_> {
     }
 
     fn sort(&self, sorting: &Sorting<'_>, point: &OldPoint, into: &mut SortedPoints) -> Result<()> {
-        let p = sorting.base_from_world * Point::from(point.world);
+        let world = Point::from(point.world);
+        let p = sorting.base_from_world * world;
         let label = point.label;
         let is_own = label.robot == sorting.number;
         // Attached points count wherever they are.
@@ -204,7 +179,8 @@ impl Surroundings<'_> {
         }
         into.cells.add_measurement(&p, point.source_id);
         let shadows = sorting.shadows.get(&point.source_id);
-        let is_grazed = shadows.is_some_and(|all| all.iter().all(|shadow| shadow.is_grazed(&p)));
+        let is_grazed =
+            shadows.is_some_and(|all| all.iter().all(|shadow| shadow.is_grazed(&world)));
         let what = match label.kind {
             PointKind::Link if is_own => return Ok(()),
             PointKind::Attachment if is_own => {

@@ -9,7 +9,7 @@
 use crate::job::MAX_TEXT;
 use contract::{Error, Kind, Result};
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most waypoints of a path.
 const MAX_WAYPOINTS: usize = 1_000_000;
@@ -28,6 +28,26 @@ pub struct Trajectory {
     pub points: Vec<Vec<f64>>,
     /// Time of each waypoint, seconds; empty where the file states none.
     pub times: Vec<f64>,
+}
+
+/// Reads paths.
+///
+/// # Errors
+/// A file that cannot be read, has more than `most` bytes, or is not a path, or more waypoints than
+/// [`MAX_WAYPOINTS`] together.
+pub(super) fn read_all(files: &[PathBuf], most: u64) -> Result<Vec<Trajectory>> {
+    let mut n = 0;
+    let one = |file: &PathBuf| {
+        let path = Trajectory::read(file, most)?;
+        n += path.points.len();
+        if n > MAX_WAYPOINTS {
+            let what = format!("the paths have more than {MAX_WAYPOINTS} waypoints together");
+            let error = Error::new(Kind::Unsupported, what).at(file.display());
+            return Err(error.hint("check them in several calls"));
+        }
+        Ok(path)
+    };
+    files.iter().map(one).collect()
 }
 
 impl Trajectory {

@@ -5,8 +5,49 @@ use clearance::{Contact, ContactLevel, ObstacleKind, STEP};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
+/// The reports of one path or several as text for people; `allowed` are doubts in a path that
+/// passes.
+#[must_use]
+pub fn words(reports: &[PathReport], allowed: &[PathDoubt]) -> String {
+    if let [one] = reports {
+        return one.words();
+    }
+    let mut text = String::new();
+    for report in reports {
+        let _ = writeln!(text, "{}\n{}", report.trajectory.display(), report.words());
+    }
+    let outcomes =
+        [PathOutcome::Free, PathOutcome::Unknown, PathOutcome::Near, PathOutcome::Blocked];
+    let count = |outcome: &PathOutcome| {
+        let n = reports.iter().filter(|report| report.outcome == *outcome).count();
+        (n > 0).then(|| format!("{n} {}", outcome.word()))
+    };
+    let counts: Vec<String> = outcomes.iter().filter_map(count).collect();
+    let n_passed = reports.iter().filter(|report| report.passes(allowed)).count();
+    let _ = writeln!(text, "{} paths: {}; {n_passed} pass", reports.len(), counts.join(", "));
+    text
+}
+
+/// The reports of one path or several as JSON for programs.
+#[must_use]
+pub fn json(reports: &[PathReport], allowed: &[PathDoubt]) -> Value {
+    if let [one] = reports {
+        return one.json();
+    }
+    let one = |report: &PathReport| {
+        let mut all = report.json();
+        all["trajectory"] = json!(report.trajectory.display().to_string());
+        all["passes"] = json!(report.passes(allowed));
+        all
+    };
+    let all: Vec<Value> = reports.iter().map(one).collect();
+    json!({ "schema": SCHEMA_OF_SEVERAL, "paths": all })
+}
+
 /// Name and version of the JSON format.
 const SCHEMA: &str = "stillpoint.check/2";
+/// Name and version of the JSON format of several paths.
+const SCHEMA_OF_SEVERAL: &str = "stillpoint.checks/1";
 /// What a check does not cover.
 const NOT_CHECKED: &str = "the robot against itself, other robots in motion, the way to the first waypoint, joints that do not go \
      straight from one waypoint to the next, limits of joints that follow others, sides that nobody saw of what hangs on it";

@@ -52,7 +52,7 @@ pub(super) enum Command {
     Report(ReportFlags),
     /// Write the points of a result in another format, or its scene for planners and simulators
     Export(ExportFlags),
-    /// Check whether a path of a robot keeps clear of scanned obstacles
+    /// Check whether paths of robots keep clear of scanned obstacles
     Check(CheckFlags),
     /// List the robots that differ between two results of a plant: moved, exchanged, appeared, gone
     Diff(DiffFlags),
@@ -266,17 +266,20 @@ pub(super) struct CheckFlags {
     /// Output folder of a run
     #[arg(value_name = "OUT")]
     pub(super) out: PathBuf,
+    /// More paths, so that `check OUT --trajectory *.csv` checks all of them
+    #[arg(value_name = "FILE")]
+    pub(super) more: Vec<PathBuf>,
     /// Path: CSV with joint names in the first line, or JSON as trajectory_msgs/JointTrajectory;
-    /// radians and metres
-    #[arg(long, value_name = "FILE")]
-    pub(super) trajectory: PathBuf,
-    /// Robot of the path (default: the only robot that has all of its joints)
+    /// radians and metres. Several take little longer than one, and the exit code is the worst
+    #[arg(long, value_name = "FILE", required = true)]
+    pub(super) trajectory: Vec<PathBuf>,
+    /// Robot of all paths (default: of each the only robot that has all of its joints)
     #[arg(long, value_name = "ID")]
     pub(super) robot: Option<String>,
     /// Distance below which something is in the way, metres
     #[arg(long, value_name = "METRES", default_value_t = 0.02)]
     pub(super) margin: f64,
-    /// The path states turning joints in degrees
+    /// The paths state turning joints in degrees
     #[arg(long)]
     pub(super) degrees: bool,
     /// Doubts that are allowed in a path that passes

@@ -89,7 +89,7 @@ fn run(line: &Line, say: &Say) -> Result<u8> {
         Command::Verify(flags) => results::verify(flags, &line.common, say),
         Command::Report(flags) => results::report(flags, &line.common, say),
         Command::Export(flags) => results::export(flags, &line.common, say),
-        Command::Check(flags) => results::check_path(flags, &line.common, say),
+        Command::Check(flags) => results::check_paths(flags, &line.common, say),
         Command::Diff(flags) => results::diff(flags, say),
         Command::History(flags) => results::history(flags, say),
         Command::Bench(BenchCommand::Accuracy(flags)) => {

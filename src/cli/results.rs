@@ -24,6 +24,7 @@ use crate::result::text_report::text_report;
 use crate::{cache, check};
 use contract::words::count;
 use contract::{Error, Format, Kind, Result};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 pub(super) fn verify(flags: &OutFlags, common: &Common, say: &Say) -> Result<u8> {
@@ -207,9 +208,9 @@ fn flags_fit(flags: &ExportFlags, scene: Option<SceneFormat>) -> Result<()> {
     usage(what, "a letter, then letters, digits, _ and -, as in cell_description")
 }
 
-/// Checks a path. The exit code is 0 for a path that is free apart from allowed doubts, 1 for one
-/// with an obstacle, and 3 where that is not known.
-pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Result<u8> {
+/// Checks paths. The exit code is 0 for paths that are free apart from allowed doubts, 1 where one
+/// has an obstacle, and 3 where that of one is not known and none has an obstacle.
+pub(super) fn check_paths(flags: &CheckFlags, common: &Common, say: &Say) -> Result<u8> {
     if !(flags.margin.is_finite() && (0.0..=MAX_MARGIN).contains(&flags.margin)) {
         return Err(Error::new(
             Kind::Usage,
@@ -221,19 +222,28 @@ pub(super) fn check_path(flags: &CheckFlags, common: &Common, say: &Say) -> Resu
     let engine = common.engine(&means)?;
     let request = CheckRequest {
         out: flags.out.clone(),
-        trajectory: flags.trajectory.clone(),
+        trajectories: [&flags.trajectory[..], &flags.more[..]].concat(),
         robot: flags.robot.clone(),
         robots: flags.robots.clone(),
         margin: flags.margin,
         degrees: flags.degrees,
     };
-    let report = check::check(&request, &means, &engine)?;
-    report.warnings.iter().for_each(|warning| say.warning(warning));
-    say.result(&if flags.json { json(&report.json())? } else { report.words() });
-    Ok(match report.outcome {
-        _ if report.passes(&flags.allow) => exit::OK,
-        Clear::Free | Clear::Unknown => exit::PARTIAL,
-        Clear::Near | Clear::Blocked => exit::NO,
+    let reports = check::check(&request, &means, &engine)?;
+    let mut told = BTreeSet::new();
+    let warnings = reports.iter().flat_map(|report| &report.warnings);
+    warnings.filter(|warning| told.insert(*warning)).for_each(|warning| say.warning(warning));
+    let (all, allowed) = (&reports[..], &flags.allow[..]);
+    say.result(&if flags.json {
+        json(&check::json(all, allowed))?
+    } else {
+        check::words(all, allowed)
+    });
+    let (passing, failing): (Vec<_>, Vec<_>) = all.iter().partition(|r| r.passes(allowed));
+    let is_blocked = failing.iter().any(|r| r.outcome > Clear::Unknown);
+    Ok(match (passing.len() == all.len(), is_blocked) {
+        (true, _) => exit::OK,
+        (false, true) => exit::NO,
+        (false, false) => exit::PARTIAL,
     })
 }
 

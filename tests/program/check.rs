@@ -64,8 +64,8 @@ fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
     // Its arm bent to its stops goes through the floor, once it is low enough.
     let mut stops = found.clone();
     (stops[1], stops[2]) = (1.2, 1.2);
-    let down = head.clone() + &line(&found) + &line(&stops);
-    let (code, down) = check(dir, &down, &["--allow", "unseen,beside,as-found"]);
+    let down_path = head.clone() + &line(&found) + &line(&stops);
+    let (code, down) = check(dir, &down_path, &["--allow", "unseen,beside,as-found"]);
     assert_eq!((code, &down["outcome"]), (1, &Value::from("blocked")), "{down}");
     let floor = contacts(&down, "floor");
     assert!(!floor.is_empty(), "{down}");
@@ -97,6 +97,8 @@ fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
     let (_, one) = check(dir, &turn, &["--threads", "1"]);
     assert_eq!(one, turned);
 
+    several(dir, &[&turn, &down_path, &(head.clone() + &line(&found))], &[&turned, &down, &stands]);
+
     // Beyond its stops it cannot get.
     let (code, beyond) = check(dir, &(head.clone() + &line(&moved(0, 9.0))), &[]);
     assert_eq!(code, 1);
@@ -112,6 +114,47 @@ fn a_path_is_free_only_where_all_is_known_and_nothing_near() {
         assert_eq!(output.status.code(), Some(code), "{text}");
         assert!(text.contains(said), "{text}");
     }
+}
+
+/// Several paths in one call have the reports of each by itself, and the worst exit code.
+fn several(dir: &Path, paths: &[&str; 3], alone: &[&Value; 3]) {
+    let files = ["turn.csv", "down.csv", "stands.csv"];
+    files
+        .iter()
+        .zip(paths)
+        .for_each(|(f, path)| std::fs::write(dir.join(f), path).expect("writes"));
+    let call = |files: &[&str], more: &[&str]| {
+        let output = program(dir, &[&["check", "out", "--trajectory"], files, more].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), String::from_utf8(output.stdout).expect("text"), said)
+    };
+    let (code, text, said) = call(&files, &["--json"]);
+    let answer: Value = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {said}"));
+    assert_eq!((code, &answer["schema"]), (Some(1), &Value::from("stillpoint.checks/1")), "{said}");
+    let reports = answer["paths"].as_array().expect("reports");
+    assert_eq!(reports.len(), 3);
+    for ((report, alone), file) in reports.iter().zip(alone).zip(files) {
+        let mut report = report.clone();
+        let own = report.as_object_mut().expect("an object");
+        assert_eq!(own.remove("trajectory"), Some(file.into()));
+        let passes = own.remove("passes").expect("is told");
+        assert_eq!(passes, own["outcome"] == "free", "{file}");
+        assert_eq!(&report, *alone, "{file}");
+    }
+    // Without the one that is blocked it is not known, and doubts that are allowed pass.
+    let unknown = ["stands.csv", "--trajectory", "turn.csv"];
+    let (code, text, _) = call(&unknown, &[]);
+    assert_eq!(code, Some(3));
+    assert!(text.starts_with("stands.csv\n") && text.contains("\nturn.csv\n"), "{text}");
+    let doubts = ["--allow", "unseen,beside,as-found,posture"];
+    let (code, text, _) = call(&unknown, &doubts);
+    assert!(code == Some(0) && text.ends_with("2 pass\n"), "{text}");
+    let (code, text, _) = call(&files, &doubts);
+    assert!(code == Some(1) && text.contains("1 blocked") && text.ends_with("2 pass\n"), "{text}");
+    // A file that is no path is named before anything is looked at.
+    std::fs::write(dir.join("odd.csv"), "elbow\n0.1\n").expect("writes");
+    let (code, text, said) = call(&["turn.csv", "odd.csv"], &[]);
+    assert!(code == Some(2) && text.is_empty() && said.contains("odd.csv"), "{said}");
 }
 
 /// A cell that the bench draws, with wires in the robot's way: curtains of points behind outlines,
@@ -132,7 +175,8 @@ fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
     assert!(hits.iter().all(|p| p["outcome"] != "free"), "{hits:?}");
     assert!(free.iter().all(|p| p["outcome"] == "free"), "{free:?}");
 
-    // Of points of still things hardly any are dropped, of strays behind edges many.
+    // Of points of still things hardly any are dropped, of strays behind edges many: what may be a
+    // wire or a pipe is kept with the strays beside it.
     let points = row["points"].as_object().expect("counts");
     let sum = |strays: bool, what: &str| -> u64 {
         let own = points.iter().filter(|(name, _)| (*name == "strays") == strays);
@@ -140,5 +184,5 @@ fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
     };
     assert!(sum(false, "n") > 20_000 && sum(true, "n") > 50, "{points:?}");
     assert!(1000 * sum(false, "n_dropped") < sum(false, "n"), "{points:?}");
-    assert!(5 * sum(true, "n_dropped") > 2 * sum(true, "n"), "{points:?}");
+    assert!(3 * sum(true, "n_dropped") > sum(true, "n"), "{points:?}");
 }

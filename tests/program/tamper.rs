@@ -143,14 +143,14 @@ impl Plant {
     fn check(&self) -> Came<Value> {
         let request = check::CheckRequest {
             out: self.at("out"),
-            trajectory: self.at("path.csv"),
+            trajectories: vec![self.at("path.csv")],
             robot: None,
             robots: None,
             margin: 0.02,
             degrees: false,
         };
         let report = check::check(&request, &Self::means(), &Engine::new(2));
-        came(report.map(|report| report.json()))
+        came(report.map(|reports| check::json(&reports, &[])))
     }
 
     /// Bytes that `export` writes.

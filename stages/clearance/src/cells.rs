@@ -179,9 +179,10 @@ impl Sight for CellSight<'_> {
         own.map(|cell| eye(cell.3)).collect::<Option<Vec<Point>>>().unwrap_or_else(all)
     }
 
-    fn are_of_others(&self, at: usize, other: usize) -> bool {
-        let is_own = |source: u16| self.of(at).iter().any(|cell| cell.3 == source);
-        !self.of(other).iter().any(|cell| is_own(cell.3))
+    fn are_of_several(&self, at: usize, other: usize) -> bool {
+        let mut sources = self.of(at).iter().chain(self.of(other)).map(|cell| cell.3);
+        let first = sources.next();
+        sources.any(|source| Some(source) != first)
     }
 
     fn is_passed(&self, at: usize, o: &Obstacle) -> bool {

@@ -3,10 +3,11 @@
 //! Scans have stray points: a beam that hits an edge partly gives a point between the edge and the
 //! surface behind it, where nothing is, and masks leave some points of a robot to the fixed world.
 //! A point that is labelled as fixed is dropped only with proof that nothing is there: beams of
-//! another scanner passed its place, and neither a surface, nor a line or a plane, nor a point of
-//! another scanner goes with it. An uncertain point is dropped without such proof, too, if it lies
-//! alone in space that beams passed through, or if its beam grazed an edge in front of it and it
-//! belongs to nothing either.
+//! another scanner passed its place, and neither a surface, nor a line, a bar or a plane, nor a
+//! point of another scanner goes with it. Beams also pass beside a thing that is thinner than their
+//! distance, so that the proof alone would drop wires and pipes. An uncertain point is dropped
+//! without such proof, too, if it lies alone in space that beams passed through, or if its beam
+//! grazed an edge in front of it and it belongs to nothing either.
 
 use crate::grid::Grid;
 use crate::lines::{self, Offset};
@@ -33,7 +34,7 @@ const MIN_CLOSE: usize = 3;
 const LINE_REACH: f32 = 0.15;
 /// Distance within which points of two scanners lie on one surface, metres: two edges leave stray
 /// points at one place by chance only.
-const AGREED: f32 = 0.03;
+const AGREED: f32 = 0.05;
 /// Largest number of unknown voxels among the six beside that of a point for its surroundings to
 /// count as seen.
 const UNKNOWN: usize = 2;
@@ -44,8 +45,8 @@ const PIECE: usize = 1 << 14;
 pub(crate) trait Sight: Sync {
     /// Places of the scanners that measured an obstacle, base frame.
     fn eyes(&self, at: usize) -> Vec<Point>;
-    /// Whether no scanner measured both obstacles.
-    fn are_of_others(&self, at: usize, other: usize) -> bool;
+    /// Whether several scanners measured two obstacles, or one of them.
+    fn are_of_several(&self, at: usize, other: usize) -> bool;
     /// Whether beams of a scanner that did not measure an obstacle passed its place.
     fn is_passed(&self, at: usize, o: &Obstacle) -> bool;
     /// Of the obstacles for which it is asked, which lie behind something that neighbouring beams
@@ -117,7 +118,7 @@ impl PointEvidence<'_> {
     fn is_of_a_thing(&self, at: usize, o: &Obstacle) -> bool {
         let mut near: Vec<Offset> = Vec::new();
         for (other, by) in self.points.offsets(at, o.at, LINE_REACH) {
-            if by.norm() < AGREED && self.sight.are_of_others(at, other) {
+            if by.norm() < AGREED && self.sight.are_of_several(at, other) {
                 return true;
             }
             near.push(by);
@@ -127,7 +128,8 @@ impl PointEvidence<'_> {
             self.points.offsets(at, o.at, lines::LONG_REACH).map(|(_, by)| by).collect()
         };
         lines::is_on_clear_plane(&near, &here, &eyes)
-            || lines::is_on_clear_line(&mut near, &here, &eyes)
+            || lines::is_on_clear_bar(&near, &here, &eyes)
+            || lines::is_on_clear_line(&near, &here, &eyes)
             || lines::is_on_long_line(&far(), &here, &eyes)
     }
 }

@@ -72,8 +72,11 @@ impl Front {
         let (cell, far) = self.cell(p);
         let mut is_passed = false;
         // The direction of the place first, since something mostly is there.
-        for i in (13..40).map(|i| i % 27) {
-            if let Some(near) = self.near.get(&beside_at(cell, i)) {
+        for cell in (13..40).map(|i| beside_at(cell, i % 27)) {
+            if !self.is_of_directions(&cell) {
+                continue;
+            }
+            if let Some(near) = self.near.get(&cell) {
                 if *near < far + BEYOND {
                     return false;
                 }
@@ -81,6 +84,19 @@ impl Front {
             }
         }
         is_passed
+    }
+
+    /// Whether a cell holds directions, which are as long as 1: about half of the 27 about one do
+    /// not, and are not worth a look.
+    fn is_of_directions(&self, cell: &[i32; 3]) -> bool {
+        let (mut low, mut high) = (0.0, 0.0);
+        for v in cell {
+            let (a, b) = (f64::from(*v) * self.width, f64::from(*v + 1) * self.width);
+            let least = if *v >= 0 { a } else { b.min(0.0) };
+            low += least * least;
+            high += (a * a).max(b * b);
+        }
+        (low..=high).contains(&1.0) || (low - 1.0).abs() < 1e-9 || (high - 1.0).abs() < 1e-9
     }
 
     /// Whether the beam to a point, or a neighbouring one, hit something in front of it.

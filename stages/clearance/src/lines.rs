@@ -15,12 +15,20 @@ const ON_CLEAR_LINE: usize = 8;
 const CLEAR_SHARE: f64 = 0.7;
 /// Number of points, the farthest ones, through which such a line is tried.
 const N_LINES: usize = 4;
-/// Largest distance of neighbours on a plane of doubtful points, metres: a wall at 6 m has ten
-/// points about each, of beams 0.15° apart that meet it at 60°.
-const PLANE_REACH: f32 = 0.10;
+/// Largest distances of neighbours on a plane of doubtful points that are tried, metres: a wall at
+/// 6 m has ten points within the first, of beams 0.15° apart that meet it at 60°; a fence of wires
+/// has them within the second.
+const PLANE_REACHES: [f32; 2] = [0.10, 0.15];
 /// Least standard deviation of such a plane's points along both of its directions, metres; along a
 /// line it is less in one.
 const PLANE_WIDTH: f32 = 0.015;
+/// Largest distances of neighbours on a bar that are tried, metres, and the largest distance from
+/// its middle line: a pipe of 20 mm, and the edge of a cell.
+const BAR_REACHES: [f32; 2] = [0.05, 0.10];
+const BAR_RADIUS: f32 = 0.015;
+/// Largest standard deviation of its points along a beam, metres: that of a pipe is 2 mm, and noise
+/// and cells of points add as much.
+const BAR_DEPTH: f32 = 0.006;
 /// Least sine of the angle between such a line or plane and a beam to it: an edge or a tip in front
 /// leaves points along the beam. 15°.
 const ACROSS_BEAM: f64 = 0.26;
@@ -48,14 +56,13 @@ pub(crate) fn is_on_line(near: &[Offset]) -> bool {
 
 /// Whether most of the points lie on one line through the origin, which is at `here`, that does not
 /// follow a beam.
-pub(crate) fn is_on_clear_line(near: &mut [Offset], here: &Point, eyes: &[Point]) -> bool {
+pub(crate) fn is_on_clear_line(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
     let most = (near.len() as f64 * CLEAR_SHARE).ceil() as usize;
     if near.len() < ON_CLEAR_LINE {
         return false;
     }
-    near.sort_by(|a, b| b.norm_squared().total_cmp(&a.norm_squared()));
-    near[..N_LINES]
-        .iter()
+    first_of(near.iter(), N_LINES, |v| -v.norm_squared())
+        .into_iter()
         .map(|v| v.normalize())
         .any(|unit| n_along(near, &unit) >= most.max(ON_CLEAR_LINE) && is_across(&unit, here, eyes))
 }
@@ -63,10 +70,9 @@ pub(crate) fn is_on_clear_line(near: &mut [Offset], here: &Point, eyes: &[Point]
 /// Whether the origin, which is at `here`, lies on a long line that does not follow a beam, with
 /// little beside it: on a wire that few beams met.
 pub(crate) fn is_on_long_line(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
-    let mut nearest: Vec<&Offset> =
-        near.iter().filter(|v| v.norm() > 2.0 * LINE_THICKNESS).collect();
-    nearest.sort_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
-    nearest.iter().take(N_DIRECTIONS).map(|v| v.normalize()).any(|unit| {
+    let apart = near.iter().filter(|v| v.norm() > 2.0 * LINE_THICKNESS);
+    let nearest = first_of(apart, N_DIRECTIONS, |v| v.norm_squared());
+    nearest.into_iter().map(|v| v.normalize()).any(|unit| {
         let (mut n, mut n_beside) = (0_usize, 0_usize);
         let mut stretches = Vec::new();
         for w in near {
@@ -91,7 +97,11 @@ pub(crate) fn is_on_long_line(near: &[Offset], here: &Point, eyes: &[Point]) -> 
 /// Whether most of the points near the origin, which is at `here`, lie on one plane through it that
 /// does not follow a beam.
 pub(crate) fn is_on_clear_plane(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
-    let near: Vec<Offset> = near.iter().filter(|v| v.norm() < PLANE_REACH).copied().collect();
+    PLANE_REACHES.iter().any(|reach| is_on_plane_within(*reach, near, here, eyes))
+}
+
+fn is_on_plane_within(reach: f32, near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
+    let near: Vec<Offset> = near.iter().filter(|v| v.norm() < reach).copied().collect();
     let most = (near.len() as f64 * CLEAR_SHARE).ceil() as usize;
     if near.len() < ON_CLEAR_LINE {
         return false;
@@ -108,6 +118,59 @@ pub(crate) fn is_on_clear_plane(near: &[Offset], here: &Point, eyes: &[Point]) -
     is_wide.all(|k| eigen.eigenvalues[k] > PLANE_WIDTH * PLANE_WIDTH)
         && near.iter().filter(|v| v.dot(&normal).abs() < LINE_THICKNESS).count() >= most
         && eyes.iter().all(is_faced)
+}
+
+/// Whether most points near the origin, which is at `here`, lie on one bar with it, such as a pipe,
+/// that does not follow a beam and is no deeper along the beams than the half of a pipe that they
+/// meet: a curtain behind an edge is as deep as what the edge hides.
+pub(crate) fn is_on_clear_bar(near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
+    BAR_REACHES.iter().any(|reach| is_on_bar_within(*reach, near, here, eyes))
+}
+
+fn is_on_bar_within(reach: f32, near: &[Offset], here: &Point, eyes: &[Point]) -> bool {
+    let near: Vec<Offset> = near.iter().filter(|v| v.norm() < reach).copied().collect();
+    if near.len() < ON_CLEAR_LINE {
+        return false;
+    }
+    let n = near.len() as f32 + 1.0;
+    let middle: Offset = near.iter().sum::<Offset>() / n;
+    let square = |v: &Offset| v * v.transpose();
+    let spread: nalgebra::Matrix3<f32> =
+        near.iter().map(|v| square(&(v - middle))).sum::<nalgebra::Matrix3<f32>>()
+            + square(&middle);
+    let spread = spread / n;
+    let eigen = spread.symmetric_eigen();
+    let along: Offset = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let off = |v: Offset| (v - along * v.dot(&along)).norm();
+    let is_flat = |eye: &Point| {
+        let beam = (here - eye).normalize().map(|v| v as f32);
+        let depth = (beam - along * beam.dot(&along)).normalize();
+        depth.dot(&(spread * depth)) < BAR_DEPTH * BAR_DEPTH
+    };
+    let most = (near.len() as f64 * CLEAR_SHARE).ceil() as usize;
+    off(middle) < BAR_RADIUS
+        && near.iter().filter(|v| off(**v - middle) < BAR_RADIUS).count() >= most
+        && is_across(&along, here, eyes)
+        && eyes.iter().all(is_flat)
+}
+
+/// The first `n` places by a key, as a stable sort has them.
+fn first_of<'a>(
+    all: impl Iterator<Item = &'a Offset>,
+    n: usize,
+    key: impl Fn(&Offset) -> f32,
+) -> Vec<&'a Offset> {
+    let mut first: Vec<(f32, &Offset)> = Vec::with_capacity(n + 1);
+    for v in all {
+        let own = key(v);
+        let is_first = first.len() < n || first.last().is_some_and(|(last, _)| own < *last);
+        if is_first {
+            let at = first.partition_point(|(other, _)| *other <= own);
+            first.insert(at, (own, v));
+            first.truncate(n);
+        }
+    }
+    first.into_iter().map(|(_, v)| v).collect()
 }
 
 /// Whether a direction leads across all beams to a place.

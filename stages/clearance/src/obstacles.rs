@@ -118,7 +118,7 @@ impl Obstacles {
     /// Sorts the obstacles into bins.
     fn sort(&mut self) {
         let bin = |o: &Obstacle| o.at.map(|v| (f64::from(v) / BIN).floor() as i32);
-        self.all.sort_by_key(bin);
+        self.all.sort_by_cached_key(bin);
         self.bins.clear();
         let mut from = 0;
         for own in self.all.chunk_by(|a, b| bin(a) == bin(b)) {

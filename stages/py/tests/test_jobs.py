@@ -99,6 +99,12 @@ def test_a_path_is_checked(demo: Demo, tmp_path: pathlib.Path) -> None:
     )
     assert answer.report["robot"] == "R1", answer.report
     assert bool(answer) == answer.passes and not (answer.passes and answer.blocked)
+    doubts = ["unseen", "beside", "as-found", "posture"]
+    several = stillpoint.check(demo.out, trajectory=[path, path], robot="R1", allow=doubts)
+    assert [one.passes for one in several] == [answer.passes] * 2
+    assert [one.blocked for one in several] == [answer.blocked] * 2
+    alone = stillpoint.check(demo.out, trajectory=[path], robot="R1", allow=doubts)
+    assert [one.report for one in alone] == [answer.report]
     with pytest.raises(stillpoint.UsageError, match="margin"):
         stillpoint.check(demo.out, trajectory=path, margin=7.0)
 

@@ -13,14 +13,14 @@ mod truth;
 use super::cases::{CaseToRun, Cases};
 use super::request::{DrawnCases, PlantSize};
 use crate::check::trajectory::Trajectory;
-use crate::check::{CheckRequest, PathReport, RobotSite, at_robot};
+use crate::check::{CheckRequest, PathReport, RobotSite, at_robots};
 use crate::detect::library;
 use crate::engine::Engine;
 use crate::eval::compare::Agreement;
 use crate::eval::virtual_scan::{Formats, scan_scene};
 use crate::job::{Job, Means};
 use crate::plan;
-use contract::{Error, Result};
+use contract::{Error, Kind, Result};
 use draw::DrawnPath;
 use evidence::PointCounts;
 use export::{ResultFile, atomic};
@@ -29,7 +29,7 @@ use row::{CheckRow, PathRow};
 use scene_robot::SceneRobot;
 use simulate::random::Random;
 use simulate::{Plant, Scene, Shapes};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 use truth::PathTruths;
 
@@ -154,19 +154,20 @@ impl Bench<'_> {
         paths.extend(draw::paths(robot, &truth.met, &mut random)?);
         let request = CheckRequest {
             out: out.to_path_buf(),
-            trajectory: PathBuf::new(),
+            trajectories: Vec::new(),
             robot: None,
             robots: None,
             margin: self.bench.margin,
             degrees: false,
         };
-        let choose = |result: &ResultFile, _: &_| nearest(result, scene, number);
-        let look = |place: &RobotSite<'_>| {
+        let choose = |result: &ResultFile, _: &_| Ok(vec![nearest(result, scene, number)?]);
+        let look = |place: &RobotSite<'_>, _: &[usize]| {
             let one = |path: &DrawnPath| self.path(place, robot, path, truth);
             let points = evidence::counts(robot, shapes, place.obstacles())?;
-            Ok(SeenSite { paths: paths.iter().map(one).collect::<Result<_>>()?, points })
+            Ok(vec![SeenSite { paths: paths.iter().map(one).collect::<Result<_>>()?, points }])
         };
-        at_robot(&request, choose, self.means, self.engine, look)
+        let seen = at_robots(&request, choose, self.means, self.engine, look)?.pop();
+        seen.ok_or_else(|| Error::new(Kind::Bug, "a robot was not looked at"))
     }
 
     /// One path.

@@ -16,7 +16,7 @@ impl Sight for OneEye {
         vec![Point::from(EYE)]
     }
 
-    fn are_of_others(&self, _: usize, _: usize) -> bool {
+    fn are_of_several(&self, _: usize, _: usize) -> bool {
         false
     }
 
@@ -193,7 +193,42 @@ fn a_wire_that_another_scanner_sees_past_stays() {
 }
 
 #[test]
+fn a_pipe_that_another_scanner_sees_past_stays() {
+    // 20 mm wide, too wide for a line and too narrow for a plane, and between two rows of beams of
+    // the scanner at the side.
+    let noise = |i: i32| [0.001, -0.002, 0.002, -0.001, 0.0][i as usize % 5];
+    let of = |i: i32| {
+        let turn = f64::from(i % 9 - 4) * 0.35;
+        let [x, y] = [-turn.cos(), turn.sin()].map(|v| 0.01 * v);
+        ([x + noise(i), y, 0.004 * f64::from(i / 9) - 0.1], 1)
+    };
+    let pipe: Vec<_> = (0..450).map(of).collect();
+    assert_eq!(fixed_among(&pipe, |_| false), [true; 450]);
+    // A curtain that dense behind an edge is as deep as what the edge hides.
+    let behind =
+        |i: i32| ([f64::from(i * i * 37 % 53) * 0.002, 0.002, 0.002 * f64::from(i % 60)], 1);
+    let curtain: Vec<_> = (0..240).map(behind).collect();
+    let n_kept = fixed_among(&curtain, |_| false).iter().filter(|is| **is).count();
+    assert!(n_kept < 24, "{n_kept}");
+}
+
+#[test]
+fn a_mesh_of_few_wires_that_another_scanner_sees_past_stays() {
+    // Wires 80 mm apart, upright and across, 45° to the beams, with a point each 5 cm.
+    let along = |i: i32| (f64::from(i % 5) * 0.08 - 0.16, f64::from(i / 5) * 0.05 - 0.2);
+    let of = |i: i32| {
+        let (u, v) = if i < 45 { along(i) } else { (along(i - 45).1, along(i - 45).0) };
+        ([u, u, v], 1)
+    };
+    let mesh: Vec<_> = (0..90).map(of).collect();
+    assert_eq!(fixed_among(&mesh, |_| false), [true; 90]);
+}
+
+#[test]
 fn points_at_which_two_scanners_agree_stay() {
-    let here = [([0.0, 0.0, 0.0], 1), ([0.012, 0.012, 0.0], 2)];
+    let here = [([0.0, 0.0, 0.0], 1), ([0.025, 0.025, 0.0], 2)];
     assert_eq!(fixed_among(&here, |_| false), [true; 2]);
+    // Or a scanner agrees with a place that both have measured.
+    let here = [([0.0, 0.0, 0.0], 1), ([0.012, 0.012, 0.0], 1), ([0.012, 0.012, 0.0], 2)];
+    assert_eq!(fixed_among(&here, |_| false), [true; 3]);
 }

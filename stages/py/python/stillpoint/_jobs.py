@@ -7,7 +7,7 @@ import logging
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
 from . import _stillpoint
 from ._result import Result
@@ -284,6 +284,7 @@ class PathCheck:
         return self.passes
 
 
+@overload
 def check(
     result: StrPath | Result,
     *,
@@ -298,8 +299,39 @@ def check(
     config: StrPath | None = None,
     set: Mapping[str, Setting] | None = None,
     progress: Progress | None = None,
-) -> PathCheck:
-    """Check whether a path of a robot keeps clear of scanned obstacles.
+) -> PathCheck: ...
+@overload
+def check(
+    result: StrPath | Result,
+    *,
+    trajectory: Iterable[StrPath],
+    robot: str | None = None,
+    margin: float | None = None,
+    degrees: bool = False,
+    allow: str | Iterable[str] | None = None,
+    robots: StrPath | None = None,
+    memory: str | None = None,
+    threads: int | None = None,
+    config: StrPath | None = None,
+    set: Mapping[str, Setting] | None = None,
+    progress: Progress | None = None,
+) -> list[PathCheck]: ...
+def check(
+    result: StrPath | Result,
+    *,
+    trajectory: StrPath | Iterable[StrPath],
+    robot: str | None = None,
+    margin: float | None = None,
+    degrees: bool = False,
+    allow: str | Iterable[str] | None = None,
+    robots: StrPath | None = None,
+    memory: str | None = None,
+    threads: int | None = None,
+    config: StrPath | None = None,
+    set: Mapping[str, Setting] | None = None,
+    progress: Progress | None = None,
+) -> PathCheck | list[PathCheck]:
+    """Check whether paths of robots keep clear of scanned obstacles.
 
     Parameters
     ----------
@@ -307,13 +339,14 @@ def check(
         A result, or its folder.
     trajectory
         Path: CSV with joint names in the first line, or JSON as
-        ``trajectory_msgs/JointTrajectory``; radians and metres.
+        ``trajectory_msgs/JointTrajectory``; radians and metres. Several paths take little longer
+        than one, since what stands around a robot is read once.
     robot
-        Id of the robot of the path; the only robot that has all of its joints without it.
+        Id of the robot of all paths; of each the only robot that has all of its joints without it.
     margin
         Distance below which something is in the way, metres; 0.02 without it.
     degrees
-        The path states turning joints in degrees.
+        The paths state turning joints in degrees.
     allow
         Doubts that are allowed in a path that passes.
     robots
@@ -322,17 +355,31 @@ def check(
     Returns
     -------
     PathCheck
-        True in a condition where the path passes.
+        True in a condition where the path passes. A list of them, in order, of several paths.
     """
     of = result.path if isinstance(result, Result) else result
     doubts = [allow] if isinstance(allow, str) else list(allow or [])
+    given = paths(trajectory)
+    if not given:
+        return []
     flags = {
-        "json": True, "trajectory": trajectory, "robot": robot, "margin": margin,
+        "json": True, "trajectory": given, "robot": robot, "margin": margin,
         "degrees": degrees, "allow": doubts, "robots": robots, "memory": memory,
         "threads": threads, "config": config, "set": settings(set),
     }  # fmt: skip
     code, text = call("check", [os.fspath(of)], flags, progress)
-    return PathCheck(passes=code == 0, blocked=code == 1, report=_json(text))
+    answer = _json(text)
+    if len(given) == 1:
+        one = PathCheck(passes=code == 0, blocked=code == 1, report=answer)
+        return one if isinstance(trajectory, (str, os.PathLike)) else [one]
+    return [
+        PathCheck(
+            passes=report["passes"],
+            blocked=report["outcome"] in ("near", "blocked"),
+            report=report,
+        )
+        for report in answer["paths"]
+    ]
 
 
 def _json(text: str) -> dict[str, Any]:
