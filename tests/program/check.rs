@@ -184,5 +184,5 @@ fn small_moves_among_all_that_a_scan_gets_wrong_are_free_and_no_collision_is() {
     };
     assert!(sum(false, "n") > 20_000 && sum(true, "n") > 50, "{points:?}");
     assert!(1000 * sum(false, "n_dropped") < sum(false, "n"), "{points:?}");
-    assert!(3 * sum(true, "n_dropped") > sum(true, "n"), "{points:?}");
+    assert!(5 * sum(true, "n_dropped") > 2 * sum(true, "n"), "{points:?}");
 }

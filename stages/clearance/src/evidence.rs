@@ -34,7 +34,7 @@ const MIN_CLOSE: usize = 3;
 const LINE_REACH: f32 = 0.15;
 /// Distance within which points of two scanners lie on one surface, metres: two edges leave stray
 /// points at one place by chance only.
-const AGREED: f32 = 0.05;
+const AGREED: f32 = 0.04;
 /// Largest number of unknown voxels among the six beside that of a point for its surroundings to
 /// count as seen.
 const UNKNOWN: usize = 2;
