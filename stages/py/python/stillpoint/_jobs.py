@@ -284,8 +284,9 @@ class PathCheck:
         return self.passes
 
 
+# A string is an iterable of strings as well; as a path it comes first.
 @overload
-def check(
+def check(  # type: ignore[overload-overlap]
     result: StrPath | Result,
     *,
     trajectory: StrPath,
