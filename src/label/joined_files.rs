@@ -63,8 +63,7 @@ impl FileGroup {
 
     /// Share of all points that are joined here, once for each file that they come to.
     pub(crate) fn share(&self) -> f64 {
-        let tiles = if self.at < self.n { 1.0 / self.n as f64 } else { 0.0 };
-        tiles + if self.has_clouds() { 1.0 } else { 0.0 }
+        self.page_share() + if self.has_clouds() { 1.0 } else { 0.0 }
     }
 
     /// Share of all points that are read for the page.
