@@ -5,6 +5,7 @@
 //! that they touch. A cut through what is bolted to a flange costs more. A hose is cut where
 //! another body holds it, and not within, and a bench is not cut off its legs.
 
+use crate::facets::{Bend, Facet};
 use crate::max_flow::{FlowNetwork, UNCUT};
 use crate::thin::LocalShape;
 use crate::voxel_graph::Graph;
@@ -32,6 +33,10 @@ const DOUBLE: u32 = 1500;
 const GROWS: u32 = 2000;
 /// All costs are multiplied by this, so that the factors act on whole numbers.
 const SCALE: u64 = 16;
+/// By which ratios an inner corner or a step costs less than an edge of which nothing is known, and
+/// a surface that runs on or bends outward more: things that touch meet in inner corners.
+const INWARD: [u64; 2] = [3, 8];
+const OUTWARD: [u64; 2] = [3, 2];
 /// How many times more an edge within a thin part costs.
 const THIN_FACTOR: u64 = 1000;
 
@@ -64,6 +69,8 @@ pub(crate) struct Body<'a> {
     pub(crate) contact: Vec<TouchesRobot>,
     pub(crate) is_fixed: Vec<bool>,
     pub(crate) shape: Vec<LocalShape>,
+    /// The surface in each voxel.
+    pub(crate) facet: Vec<Facet>,
 }
 
 impl Body<'_> {
@@ -111,6 +118,11 @@ impl Body<'_> {
         if preference == Preference::NearRobot && !is_hose {
             factor += u64::from(length.min(GROWS)) * SCALE / u64::from(DOUBLE);
         }
+        factor = match self.facet[a].bend_to(&self.facet[b]) {
+            Bend::Inward => factor * INWARD[0] / INWARD[1],
+            Bend::Outward => factor * OUTWARD[0] / OUTWARD[1],
+            Bend::Unknown => factor,
+        };
         // A hose is cut where another body holds it, and a leg nowhere.
         let enters_hose = |from: usize, to: usize| {
             let is_beyond = self.length[to] >= self.length[from];

@@ -4,6 +4,7 @@
 use crate::attached::{Attached, Decided, Group, attached_to, mark};
 use crate::body_cut::{Body, TouchesRobot};
 use crate::bridges::bridges;
+use crate::facets::Facet;
 use crate::floating::{self, Bodies};
 use crate::settings::Settings;
 use crate::share::{Share, share};
@@ -26,6 +27,15 @@ pub struct Attach {
     settings: Settings,
 }
 
+/// How a component reaches a robot.
+#[derive(Clone, Copy)]
+enum Reach {
+    /// It touches a link that moves.
+    Touching,
+    /// It touches none; voxels that are no farther from a hand, metres, may hang on it.
+    Hidden(f32),
+}
+
 /// The voxels gathered so far. They are sorted and merged from time to time, so that memory grows
 /// with the plant and not with the number of scans.
 #[derive(Debug, Default)]
@@ -38,6 +48,9 @@ pub struct ResidualSum {
 /// Distance from a link up to which a voxel touches it and is not only near it, metres: the largest
 /// gate of the segmentation.
 const TOUCH: f32 = 0.012;
+/// Distance from a hand up to which a body may hang on a flange that no scan sees, metres: as far as
+/// a tool changer is thick.
+const HIDDEN_MOUNT: f32 = 0.07;
 /// Longest tool of a robot, as a share of the robot's reach, and at least so long, metres: a spot
 /// welding gun of 1 m on an arm that reaches 3.1 m.
 const LONGEST_TOOL: f64 = 0.33;
@@ -101,7 +114,8 @@ impl Attach {
         out: &mut Decided,
     ) {
         let (mut robot, mut marks) = (Vec::new(), Vec::new());
-        let in_contact = |at: usize| self.in_contact(&voxels[at]);
+        let reach = self.reach_of(voxels, members);
+        let in_contact = |at: usize| self.reaches(&voxels[at], reach);
         for &at in members.iter().filter(|at| in_contact(**at)) {
             let mark = mark(voxels[at].nearest);
             robot.push((at, mark));
@@ -112,9 +126,13 @@ impl Attach {
         let is_fixed = |at: usize| !in_contact(at) && self.is_fixed(&voxels[at]);
         let n_fixed = members.iter().filter(|at| is_fixed(**at)).count();
         let is_cut = n_fixed >= MIN_FIXED || (n_fixed > 0 && n_fixed * FEW >= members.len());
+        let is_hidden = matches!(reach, Reach::Hidden(_));
+        if is_hidden && !is_cut {
+            return;
+        }
         let mut group = Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut };
         let sides = if is_cut {
-            self.cut(&graph.part(members), voxels, members, paths, link)
+            self.cut(&graph.part(members), (voxels, members, reach), paths, link)
         } else if members.len() < self.settings.min_voxels {
             vec![Share::Open; members.len()]
         } else {
@@ -122,7 +140,12 @@ impl Attach {
         };
         for (&at, share) in members.iter().zip(sides) {
             match share {
-                Share::Fixed if !in_contact(at) => {}
+                Share::Fixed if is_hidden || !in_contact(at) => {}
+                // What is only below a flange may be its tool, or not.
+                Share::Robot if is_hidden => {
+                    group.n_uncertain += 1;
+                    out.labels[at] = Some(Label::UNCERTAIN);
+                }
                 Share::Fixed | Share::Open => {
                     group.n_uncertain += 1;
                     out.labels[at] = Some(Label::UNCERTAIN);
@@ -141,8 +164,7 @@ impl Attach {
     fn cut(
         &self,
         graph: &Graph,
-        voxels: &[ResidualVoxel],
-        members: &[usize],
+        (voxels, members, reach): (&[ResidualVoxel], &[usize], Reach),
         paths: &[(u32, u32)],
         link: LinkAt,
     ) -> Vec<Share> {
@@ -155,24 +177,25 @@ impl Attach {
             length[k] > too_far && matches!(shape[k], LocalShape::Body | LocalShape::Flat)
         };
         let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
-            _ if !self.in_contact(&voxels[*at]) => TouchesRobot::None,
+            _ if !self.reaches(&voxels[*at], reach) => TouchesRobot::None,
             true => TouchesRobot::Touch,
             false => TouchesRobot::Near,
         };
         let is_fixed = |k: usize| {
             let voxel = &voxels[members[k]];
-            is_too_far(k) || !self.in_contact(voxel) && self.is_fixed(voxel)
+            is_too_far(k) || !self.reaches(voxel, reach) && self.is_fixed(voxel)
         };
         let is_fixed = (0..members.len()).map(is_fixed).collect();
         share(&Body {
             graph,
-            from_hand: self.ways_from_hand(graph, voxels, members, &length),
+            from_hand: self.ways_from_hand(graph, (voxels, members, reach), &length),
             longest_tool,
             thin: self.settings.thin,
             contact: members.iter().map(contact).collect(),
             is_fixed,
             shape,
             length,
+            facet: members.iter().map(|at| Facet::of(&voxels[*at])).collect(),
         })
     }
 
@@ -181,12 +204,11 @@ impl Attach {
     fn ways_from_hand(
         &self,
         graph: &Graph,
-        voxels: &[ResidualVoxel],
-        members: &[usize],
+        (voxels, members, reach): (&[ResidualVoxel], &[usize], Reach),
         length: &[u32],
     ) -> Vec<Option<u32>> {
         let touches_hand = |at: &usize| {
-            self.in_contact(&voxels[*at]) && is_among(&self.wrists, voxels[*at].nearest)
+            self.reaches(&voxels[*at], reach) && is_among(&self.wrists, voxels[*at].nearest)
         };
         let seeds: Vec<(usize, u32)> =
             (0..members.len()).filter(|k| touches_hand(&members[*k])).map(|k| (k, 0)).collect();
@@ -201,6 +223,26 @@ impl Attach {
     /// Whether a voxel touches a link that moves.
     fn in_contact(&self, voxel: &ResidualVoxel) -> bool {
         voxel.distance <= self.settings.contact && self.is_moving(voxel.nearest)
+    }
+
+    /// How a component reaches a robot: where none of it touches one, what of it is nearest to a
+    /// hand and lies a short way from it.
+    fn reach_of(&self, voxels: &[ResidualVoxel], members: &[usize]) -> Reach {
+        let mut own = members.iter().map(|at| &voxels[*at]);
+        if own.clone().any(|voxel| self.in_contact(voxel)) {
+            return Reach::Touching;
+        }
+        let is_at_hand = |v: &&ResidualVoxel| is_among(&self.hands, v.nearest);
+        let distances = own.by_ref().filter(is_at_hand).map(|v| v.distance);
+        let least = distances.fold(f32::INFINITY, f32::min);
+        Reach::Hidden(HIDDEN_MOUNT.min(least + RESIDUAL_EDGE as f32))
+    }
+
+    fn reaches(&self, voxel: &ResidualVoxel, reach: Reach) -> bool {
+        match reach {
+            Reach::Touching => self.in_contact(voxel),
+            Reach::Hidden(far) => voxel.distance <= far && is_among(&self.hands, voxel.nearest),
+        }
     }
 
     /// Whether a voxel shows that its body is fixed: it stands on the floor, continues outside of
@@ -321,3 +363,5 @@ fn most_frequent(marks: &mut [u32]) -> Option<LinkAt> {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod touch_tests;

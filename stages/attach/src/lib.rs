@@ -15,6 +15,7 @@ mod attached;
 mod body_cut;
 mod bridges;
 mod decide;
+mod facets;
 mod floating;
 mod hulls;
 mod max_flow;

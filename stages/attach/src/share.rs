@@ -35,6 +35,18 @@ const NECK_RATIO: f64 = 3.0;
 /// Least number of voxels in a layer of a neck with which what is behind it is compared.
 const LEAST_NECK: usize = 6;
 
+/// Way along a body up to which its robot's side is held to be a tool where the cut is not at the
+/// end of something, hundredths of a voxel's edge (10 cm): the side may hold what stands beside it.
+const CERTAIN: u32 = 500;
+/// How many times more voxels a side has than touch it behind its cut, if it does not stand there.
+const LIGHT: usize = 18;
+/// How many times wider than there the body is within 10 cm behind such a cut.
+const WIDENS: usize = 3;
+/// Way along such a side, in longest tools: around a plate it is longer than a tool is.
+const LIGHT_TOOLS: u32 = 2;
+/// Largest distance of the hand from the middle of such a side, in mean distances of its voxels.
+const CENTRED: f64 = 0.6;
+
 /// To whom a voxel belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Share {
@@ -55,13 +67,21 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     // A cut that leaves more than a tool on the robot's side has not found where the tool ends, nor
     // has one behind which the body is as wide as at the cut: a bench would go with the tool.
     let is_whole = is_whole(body, &near);
-    let is_tool = is_whole || is_like_a_tool(body, &near);
-    let tip = up_to_where_it_widens(body, &near).filter(|tip| is_tool && is_like_a_tool(body, tip));
+    let mut is_light = is_light_touch(body, &near);
+    // Wide flat surfaces are cut off near the robot, also those of a plate that it holds.
+    if !is_light && is_light_touch(body, &far) && (is_on_top(body, &far) || hangs(body, &far)) {
+        is_light = true;
+        near.clone_from(&far);
+    }
+    let is_tool = is_whole || is_light || is_like_a_tool(body, &near);
+    let tip = up_to_where_it_widens(body, &near)
+        .filter(|tip| is_tool && (is_light || is_like_a_tool(body, tip)));
     let has_tip = tip.is_some();
     let held = match is_tool {
         true if is_whole => u32::MAX,
+        true if is_light => LIGHT_TOOLS * body.longest_tool,
         true if has_tip || is_narrow(body, &near) => body.longest_tool,
-        true => DOUBT,
+        true => CERTAIN,
         false => MOUNT,
     };
     near = tip.unwrap_or(near);
@@ -114,6 +134,66 @@ fn is_like_a_tool(body: &Body<'_>, side: &[bool]) -> bool {
     !widths.keys().filter(|at| **at >= DOUBT / LAYER).any(is_wider) && !levels.keys().any(is_wide)
 }
 
+/// Whether a side touches what is behind its cut so little, for its size, that it does not stand on
+/// it: a plate of suction cups on a pile. Behind the cut the body must become wide at once, as legs
+/// of a bench do not, and the side must be centred beside the hand, as a bench rarely is.
+fn is_light_touch(body: &Body<'_>, side: &[bool]) -> bool {
+    let layers = layers_behind(body, side);
+    let n_touched = layers[0].len();
+    let is_own = |k: usize| side[k] && body.shape[k] != LocalShape::Hose;
+    let own: Vec<usize> = (0..side.len()).filter(|k| is_own(*k)).collect();
+    let n_own = own.len();
+    let widens = layers[..N_FOLLOWED].iter().any(|layer| layer.len() >= WIDENS * n_touched);
+    let is_near = own.iter().all(|k| body.length[*k] <= LIGHT_TOOLS * body.longest_tool);
+    let is_light = n_touched > 0 && n_own >= LIGHT * n_touched;
+    is_light && widens && is_near && is_centred(body, &own)
+}
+
+/// Whether what is behind the cut of a side faces up: the side rests on it. A bench whose legs are
+/// cut has sides of legs there.
+fn is_on_top(body: &Body<'_>, side: &[bool]) -> bool {
+    let layers = layers_behind(body, side);
+    let faces = layers[..N_BESIDE].iter().flatten().filter_map(|k| body.facet[*k].faces_up());
+    let (mut n, mut n_up) = (0, 0);
+    for faces_up in faces {
+        n += 1;
+        n_up += usize::from(faces_up);
+    }
+    n_up >= LEAST_NECK && 2 * n_up >= n
+}
+
+/// Whether a side hangs between the robot and a thin part, as one that a robot holds and a hose
+/// leads to: what stands is held from below.
+fn hangs(body: &Body<'_>, side: &[bool]) -> bool {
+    let is_at_cut = |k: &usize| body.graph.neighbours(*k).any(|(other, _)| !side[other]);
+    let own: Vec<usize> = (0..side.len()).filter(|k| side[*k]).collect();
+    let at_cut: Vec<usize> = own.iter().copied().filter(is_at_cut).collect();
+    let others: Vec<bool> = side.iter().map(|own| !own).collect();
+    let layers = layers_behind(body, &others);
+    let is_thin = layers[N_BESIDE..N_BESIDE + N_FOLLOWED]
+        .iter()
+        .all(|layer| (1..=THIN_NECK).contains(&layer.len()));
+    let height = |of: &[usize]| {
+        of.iter().map(|k| f64::from(body.graph.voxel(*k)[2])).sum::<f64>() / of.len() as f64
+    };
+    !at_cut.is_empty() && is_thin && height(&at_cut) > height(&own)
+}
+
+/// Whether voxels lie about those of them that touch the robot, seen from above.
+fn is_centred(body: &Body<'_>, own: &[usize]) -> bool {
+    let place = |k: &usize| body.graph.voxel(*k).map(f64::from);
+    let mean = |chosen: &[usize]| {
+        let sum = chosen.iter().map(place).fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);
+        sum.map(|v| v / chosen.len() as f64)
+    };
+    let touches = |k: &usize| body.contact[*k] != TouchesRobot::None;
+    let hand: Vec<usize> = own.iter().copied().filter(touches).collect();
+    let (hand, middle) = (mean(&hand), mean(own));
+    let away = |v: [f64; 3]| (v[0] - middle[0]).hypot(v[1] - middle[1]);
+    let spread = own.iter().map(|k| away(place(k))).sum::<f64>() / own.len() as f64;
+    away([hand[0], hand[1], 0.0]) <= CENTRED * spread
+}
+
 /// A side without its voxels beside the cut.
 fn inside(body: &Body<'_>, side: &[bool]) -> Vec<bool> {
     let is_inside = |k: usize| side[k] && body.graph.neighbours(k).all(|(other, _)| side[other]);
@@ -145,11 +225,18 @@ fn up_to_where_it_widens(body: &Body<'_>, side: &[bool]) -> Option<Vec<bool>> {
     Some(side)
 }
 
-/// Whether a body is narrower at a cut than before it.
+/// Whether a body is narrower at a cut than beside the hand, as fingers are.
 fn is_narrow(body: &Body<'_>, side: &[bool]) -> bool {
+    let mut widths = vec![0; (CERTAIN / LAYER) as usize];
+    for k in (0..side.len()).filter(|k| side[*k] && body.shape[*k] != LocalShape::Hose) {
+        if let Some(width) = widths.get_mut((body.length[k] / LAYER) as usize) {
+            *width += 1;
+        }
+    }
+    widths.sort_unstable();
     let layers = layers_behind(body, side);
     let behind = layers[..2].iter().map(Vec::len).min().unwrap_or(0);
-    3 * behind <= 2 * widest_layer(body, side)
+    3 * behind <= 2 * widths[widths.len() / 2]
 }
 
 /// Largest number of voxels on a side that are equally far from the robot, hoses aside.
@@ -206,6 +293,7 @@ mod tests {
             contact: vec![TouchesRobot::None; n],
             is_fixed: vec![false; n],
             shape: vec![LocalShape::Body; n],
+            facet: Vec::new(),
         };
         is_like_a_tool(&body, &vec![true; n])
     }

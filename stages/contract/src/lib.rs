@@ -48,7 +48,7 @@ pub use fit::{
 pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};
 pub use ptx::is_ptx_no_return;
-pub use residual::{LinkAt, PlaceRun, RESIDUAL_EDGE, ResidualVoxel, TileLabels};
+pub use residual::{LinkAt, PlaceRun, RESIDUAL_EDGE, ResidualVoxel, TileLabels, VoxelSurface};
 pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId, ScannerPosition};
 pub use space::{Space, SpaceGrid, SpaceKind};
 pub use step::{Fan, Fold, Map, OneByOne, Weigh};

@@ -29,12 +29,42 @@ pub struct ResidualVoxel {
     pub nearest: LinkAt,
     /// Distance of the nearest point from that link's surface, metres; infinite beyond the reach
     /// of the link's distance field.
-    /// reach.
     pub distance: f32,
     /// Whether it lies at the border of the region, so that its body may continue outside.
     pub at_border: bool,
     /// Whether the voxel stands on the floor.
     pub grounded: bool,
+    /// What is known of the surface in it.
+    pub surface: VoxelSurface,
+}
+
+/// Sums over the points without a label in a voxel, in whole numbers, so that the order of adding
+/// has no effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct VoxelSurface {
+    /// Sum of the places within the voxel, 1/256 of its edge along world x, y and z.
+    pub places: [u64; 3],
+    /// Sum of the unit normals that point to the scanner, 1/256 along world x, y and z; of points
+    /// near edges none is known.
+    pub normals: [i64; 3],
+}
+
+impl VoxelSurface {
+    /// That of one point at these places in its voxel (0 to 1), with its unit normal in the world.
+    #[must_use]
+    pub fn of(within: [f64; 3], normal: Option<[f64; 3]>) -> Self {
+        Self {
+            places: within.map(|v| (256.0 * v).clamp(0.0, 255.0) as u64),
+            normals: normal.map_or([0; 3], |n| n.map(|v| (256.0 * v.clamp(-1.0, 1.0)) as i64)),
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        for i in 0..3 {
+            self.places[i] = self.places[i].saturating_add(other.places[i]);
+            self.normals[i] = self.normals[i].saturating_add(other.normals[i]);
+        }
+    }
 }
 
 impl ResidualVoxel {
@@ -50,6 +80,7 @@ impl ResidualVoxel {
         }
         self.at_border |= other.at_border;
         self.grounded |= other.grounded;
+        self.surface.join(&other.surface);
     }
 }
 
@@ -167,10 +198,10 @@ mod tests {
 
         #[test]
         fn joining_voxels_does_not_depend_on_order(
-            parts in prop::collection::vec((0_u32..9, 0_u32..9, 0_u16..3, 0_u16..3, 0.0_f32..1.0, any::<bool>(), any::<bool>()), 1..6),
+            parts in prop::collection::vec((0_u32..9, 0_u32..9, 0_u16..3, 0_u16..3, 0.0_f32..1.0, any::<bool>(), any::<bool>(), prop::array::uniform3(0_u64..999), prop::array::uniform3(-99_i64..99)), 1..6),
             turn in 0_usize..6,
         ) {
-            let voxel = |(n_residual, n_link, robot, link, distance, at_border, grounded)| ResidualVoxel {
+            let voxel = |(n_residual, n_link, robot, link, distance, at_border, grounded, places, normals)| ResidualVoxel {
                 voxel: [0; 3],
                 n_residual,
                 n_link,
@@ -178,6 +209,7 @@ mod tests {
                 distance,
                 at_border,
                 grounded,
+                surface: VoxelSurface { places, normals },
             };
             let voxels: Vec<ResidualVoxel> = parts.into_iter().map(voxel).collect();
             let join = |all: &[ResidualVoxel]| {

@@ -8,11 +8,11 @@ use crate::raster::PixelRaster;
 use crate::settings::Settings;
 use contract::{
     Cluster, Error, Fan, Fit, Floor, Kind, Label, LinkAt, Map, PlaceRun, PointKind, RESIDUAL_EDGE,
-    ResidualVoxel, Result, Scan, Tile, TileLabels,
+    ResidualVoxel, Result, Scan, Tile, TileLabels, VoxelSurface,
 };
 use geometry::depth::{Rows, rotate, rows, transform};
 use geometry::narrow::floor_i32;
-use geometry::{Aabb, Point, Pose};
+use geometry::{Aabb, Point, Pose, Vector};
 use robot::{Model, Role};
 
 /// Number of neighbouring points for which the links nearby are determined together.
@@ -238,7 +238,7 @@ impl Segment {
 
     /// Whether a point close to the floor lies on the upright side of a link, well inside its gate.
     fn on_side(&self, s: &LinkInTile, surface: [f32; 3], distance: f32) -> bool {
-        let up = s.link.world_from_link.rotation.inverse() * geometry::Vector::z();
+        let up = s.link.world_from_link.rotation.inverse() * Vector::z();
         let rise = surface[0] * up.x as f32 + surface[1] * up.y as f32 + surface[2] * up.z as f32;
         rise.abs() < 0.5 && distance <= 0.5 * s.link.gate
     }
@@ -332,7 +332,8 @@ impl Map for Segment {
             }
         }
         self.settle(&tile, raster, &mut scratch.found);
-        let mut out = gather(&tile, &scan.world_from_scan, &scratch.found, empty);
+        let normal = |i: usize| raster.and_then(|r| r.normal(&tile, i));
+        let mut out = gather(&tile, &scan.world_from_scan, &scratch.found, normal, empty);
         self.name_tools(&mut out);
         Ok(out)
     }
@@ -389,6 +390,7 @@ fn gather(
     tile: &Tile,
     world_from_scan: &Pose,
     found: &[PointState],
+    normal: impl Fn(usize) -> Option<[f32; 3]>,
     mut out: TileLabels,
 ) -> TileLabels {
     for (i, found) in found.iter().enumerate() {
@@ -402,7 +404,8 @@ fn gather(
             }
             PointState::Default => continue,
         };
-        let voxel = world(world_from_scan, tile.xyz[i]).map(|v| floor_i32(v / RESIDUAL_EDGE));
+        let at = world(world_from_scan, tile.xyz[i]).map(|v| v / RESIDUAL_EDGE);
+        let voxel = at.map(floor_i32);
         if on_link {
             let (robot, link) = (touch.link.robot as i16, touch.link.link as i16);
             out.labels.push(PlaceRun::one(place, Label { kind: PointKind::Link, robot, link }));
@@ -417,6 +420,10 @@ fn gather(
             distance: touch.distance,
             at_border: touch.at_border && !on_link,
             grounded: touch.grounded && !on_link,
+            surface: match on_link {
+                true => VoxelSurface::default(),
+                false => surface(world_from_scan, at, tile.xyz[i], normal(i)),
+            },
         };
         match out.voxels.last_mut() {
             Some(last) if last.voxel == voxel => last.join(&entry),
@@ -434,6 +441,22 @@ fn gather(
         same
     });
     out
+}
+
+/// The surface at a point: `at` are its world coordinates in voxels, `p` its place and `normal` its
+/// normal of any sign in the frame of the scan.
+fn surface(
+    world_from_scan: &Pose,
+    at: [f64; 3],
+    p: [f32; 3],
+    normal: Option<[f32; 3]>,
+) -> VoxelSurface {
+    let to_scanner = |n: [f32; 3]| {
+        let away = n[0] * p[0] + n[1] * p[1] + n[2] * p[2] > 0.0;
+        let n = n.map(|v| f64::from(if away { -v } else { v }));
+        (world_from_scan.rotation * Vector::from(n)).into()
+    };
+    VoxelSurface::of(at.map(|v| v - v.floor()), normal.map(to_scanner))
 }
 
 #[inline]

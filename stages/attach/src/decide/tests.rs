@@ -1,7 +1,7 @@
 //! Hoses, tools, workpieces and walls beside a two-link robot.
 
 use super::*;
-use contract::{JointFit, PointKind, Verdict};
+use contract::{JointFit, PointKind, Verdict, VoxelSurface};
 use geometry::{Aabb, Pose, Vector};
 use robot::{Joint, JointKind, Link, Motion, Role};
 use std::sync::Arc;
@@ -56,7 +56,7 @@ fn fit() -> Fit {
 }
 
 /// One voxel whose distance from link `link` is given in voxels.
-fn voxel(at: Voxel, link: u16, n_away: i32) -> ResidualVoxel {
+pub(super) fn voxel(at: Voxel, link: u16, n_away: i32) -> ResidualVoxel {
     ResidualVoxel {
         voxel: at,
         n_residual: 5,
@@ -65,10 +65,11 @@ fn voxel(at: Voxel, link: u16, n_away: i32) -> ResidualVoxel {
         distance: n_away as f32 * 0.02 + 0.01,
         at_border: false,
         grounded: false,
+        surface: VoxelSurface::default(),
     }
 }
 
-fn attached(parts: &[Vec<ResidualVoxel>]) -> Attached {
+pub(super) fn attached(parts: &[Vec<ResidualVoxel>]) -> Attached {
     let attach = Attach::new(&[fit()], &[model()], Settings::default());
     let mut sum = attach.empty();
     for part in parts {
@@ -144,7 +145,7 @@ fn the_result_does_not_depend_on_the_order_of_parts() {
 }
 
 /// The outside of a box between two corners.
-fn shell(min: Voxel, max: Voxel, voxel: impl Fn(Voxel) -> ResidualVoxel) -> Vec<ResidualVoxel> {
+pub(super) fn shell(min: Voxel, max: Voxel, voxel: impl Fn(Voxel) -> ResidualVoxel) -> Vec<ResidualVoxel> {
     let mut out = Vec::new();
     for x in min[0]..=max[0] {
         for y in min[1]..=max[1] {

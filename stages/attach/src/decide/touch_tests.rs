@@ -1,0 +1,126 @@
+//! Tools that touch things, and things that stand beside a tool.
+
+use super::tests::{attached, shell, voxel};
+use super::*;
+use crate::attached::Attached;
+use contract::{PointKind, VoxelSurface};
+
+fn below(at: Voxel) -> ResidualVoxel {
+    voxel(at, 1, -at[2])
+}
+
+fn n_of(out: &Attached, of: &[ResidualVoxel], kind: PointKind) -> usize {
+    of.iter().filter(|v| out.label(v.voxel).kind == kind).count()
+}
+
+/// A bench whose border lies outside of the region.
+fn bench(min: Voxel, max: Voxel) -> Vec<ResidualVoxel> {
+    shell(min, max, |at| ResidualVoxel { at_border: at[0] == max[0], ..below(at) })
+}
+
+#[test]
+fn a_box_beside_a_tool_does_not_go_with_it() {
+    // Of what holds the box on the bench less is seen than of how near it is to the tool.
+    let tool = shell([-2, -2, -9], [2, 2, 0], below);
+    let box_beside = shell([3, -5, -16], [11, 5, -4], below);
+    let bench = bench([7, -3, -18], [30, 3, -17]);
+    let out = attached(&[tool.clone(), box_beside.clone(), bench.clone()]);
+    let n_lost = n_of(&out, &box_beside, PointKind::Attachment);
+    assert!(10 * n_lost <= box_beside.len(), "{n_lost} of {}", box_beside.len());
+    assert_eq!(n_of(&out, &bench, PointKind::Attachment), 0);
+    assert_eq!(n_of(&out, &tool, PointKind::Fixed), 0);
+}
+
+/// A plate below a pole under the arm, with four cups that stand on a pile.
+fn plate_on_cups() -> [Vec<ResidualVoxel>; 2] {
+    let mut tool = shell([-1, -1, -6], [1, 1, 0], below);
+    tool.extend(shell([-10, -8, -8], [10, 8, -7], below));
+    for (x, y) in [(-8, -6), (-8, 6), (8, -6), (8, 6)] {
+        tool.extend(shell([x, y, -12], [x, y, -9], below));
+    }
+    let mut pile = shell([-14, -14, -30], [14, 14, -13], |at| ResidualVoxel {
+        grounded: at[2] == -30,
+        ..below(at)
+    });
+    for top in pile.iter_mut().filter(|v| v.voxel[2] == -13) {
+        *top = faced(top.voxel, [0, 0, 1]);
+    }
+    [tool, pile]
+}
+
+#[test]
+fn a_plate_of_suction_cups_on_a_pile_moves_and_the_pile_does_not() {
+    let [tool, pile] = plate_on_cups();
+    let out = attached(&[tool.clone(), pile.clone()]);
+    let n_moving = n_of(&out, &tool, PointKind::Attachment);
+    assert!(10 * n_moving >= 9 * tool.len(), "{n_moving} of {}", tool.len());
+    assert_eq!(n_of(&out, &pile, PointKind::Attachment), 0);
+}
+
+#[test]
+fn a_table_beside_the_hand_is_no_plate_of_cups() {
+    let [mut tool, _] = plate_on_cups();
+    // The same below a tool's tip, but all to one side of it, and on legs to the floor.
+    tool.retain(|v| v.voxel[2] >= -6);
+    let top = shell([-1, -1, -8], [40, 30, -7], below);
+    let mut legs = Vec::new();
+    for (x, y) in [(0, 0), (39, 0), (0, 29), (39, 29)] {
+        legs.extend(shell([x, y, -40], [x, y, -9], |at| ResidualVoxel {
+            grounded: at[2] == -40,
+            ..below(at)
+        }));
+    }
+    let out = attached(&[tool, top.clone(), legs.clone()]);
+    assert_eq!(n_of(&out, &legs, PointKind::Attachment), 0);
+    let n_lost = n_of(&out, &top, PointKind::Attachment);
+    assert!(100 * n_lost <= top.len(), "{n_lost} of {}", top.len());
+}
+
+#[test]
+fn what_may_hang_on_a_hidden_flange_is_open() {
+    let farther = |v: &ResidualVoxel| ResidualVoxel { distance: v.distance + 0.03, ..*v };
+    let tool: Vec<_> = shell([-2, -2, -9], [2, 2, -1], below).iter().map(farther).collect();
+    let part: Vec<_> = shell([-9, -9, -14], [9, 9, -10], below).iter().map(farther).collect();
+    let bench: Vec<_> = bench([-30, -30, -16], [30, 30, -15]).iter().map(farther).collect();
+    let out = attached(&[tool.clone(), part, bench.clone()]);
+    assert_eq!(n_of(&out, &tool, PointKind::Attachment), 0);
+    let n_open = n_of(&out, &tool, PointKind::Uncertain);
+    assert!(3 * n_open >= 2 * tool.len(), "{n_open} of {}", tool.len());
+    assert!(out.groups.iter().all(|group| group.n_attached == 0));
+    assert_eq!(n_of(&out, &bench, PointKind::Attachment), 0);
+}
+
+/// A voxel of a face that is seen with this normal.
+fn faced(at: Voxel, normal: [i64; 3]) -> ResidualVoxel {
+    let surface = VoxelSurface { places: [640; 3], normals: normal.map(|v| 5 * 256 * v) };
+    ResidualVoxel { surface, ..below(at) }
+}
+
+#[test]
+fn a_cut_follows_the_inner_corner() {
+    // A cup of 7 × 7 voxels on a box of 9 × 9: the corner is at z = -5, and an edge as long as the
+    // cup is round is anywhere above it.
+    let side = |half: i32, z: std::ops::Range<i32>, grounded: i32| {
+        let mut out = Vec::new();
+        for (k, z) in (-half..half).flat_map(|k| z.clone().map(move |z| (k, z))) {
+            for (at, normal) in [
+                ([half, k, z], [1, 0, 0]),
+                ([-k, half, z], [0, 1, 0]),
+                ([-half, -k, z], [-1, 0, 0]),
+                ([k, -half, z], [0, -1, 0]),
+            ] {
+                out.push(ResidualVoxel { grounded: z <= grounded, ..faced(at, normal) });
+            }
+        }
+        out
+    };
+    let cup = side(3, -5..1, i32::MIN);
+    let mut part = side(4, -20..-6, -19);
+    for (x, y) in (-4..=4).flat_map(|x| (-4..=4).map(move |y| (x, y))) {
+        part.push(faced([x, y, -6], [0, 0, 1]));
+    }
+    let out = attached(&[cup.clone(), part.clone()]);
+    let n_moving = n_of(&out, &cup, PointKind::Attachment);
+    assert!(4 * n_moving >= 3 * cup.len(), "{n_moving} of {}", cup.len());
+    assert_eq!(n_of(&out, &part, PointKind::Attachment), 0);
+}
