@@ -75,7 +75,7 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     }
     let is_tool = is_whole || is_light || is_like_a_tool(body, &near);
     let tip = up_to_where_it_widens(body, &near)
-        .filter(|tip| is_tool && (is_light || is_like_a_tool(body, tip)));
+        .filter(|tip| is_tool && !is_light && is_like_a_tool(body, tip));
     let has_tip = tip.is_some();
     let held = match is_tool {
         true if is_whole => u32::MAX,
@@ -92,6 +92,8 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     // One voxel beside a cut may be on either side of it.
     let inside = inside(body, &near);
     let share = |k: usize| {
+        // Beside another link than a hand nothing is a tool.
+        let held = if is_whole || body.from_hand[k].is_some() { held } else { held.min(MOUNT) };
         let is_held = inside[k] && (body.length[k] <= held || is_hose(k));
         match (near[k], far[k]) {
             (true, far) if is_held && (far || has_tip) => Share::Robot,
