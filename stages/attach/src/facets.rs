@@ -58,10 +58,6 @@ impl Facet {
         };
         let turn = (b - a).dot(&way);
         let rise = 0.5 * (a + b).dot(&way).abs();
-        if turn < -INWARD || a.dot(&b) > 0.7 && rise > STEP {
-            Bend::Inward
-        } else {
-            Bend::Outward
-        }
+        if turn < -INWARD || a.dot(&b) > 0.7 && rise > STEP { Bend::Inward } else { Bend::Outward }
     }
 }

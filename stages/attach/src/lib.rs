@@ -7,7 +7,9 @@
 //! A component that touches a moving link and nothing fixed is an attachment. A component that
 //! touches both is cut where that costs least, twice: once where a cut near the robot is preferred,
 //! and once without. What both cuts leave to the robot moves, if it is a hose or near the hand.
-//! What they disagree on is uncertain, and the rest is fixed. A body in the air beside a hand, far
+//! What they disagree on is uncertain, and the rest is fixed. Cuts follow inner corners of the
+//! surface, where things touch. What rests on something so lightly that it cannot stand there, or
+//! hangs on a hose besides, moves with the hand that it touches. A body in the air beside a hand, far
 //! from everything else, belongs to the hand.
 #![forbid(unsafe_code)]
 
@@ -17,7 +19,9 @@ mod bridges;
 mod decide;
 mod facets;
 mod floating;
+mod held;
 mod hulls;
+mod layers;
 mod max_flow;
 mod near_voxels;
 mod settings;

@@ -2,6 +2,8 @@
 //! the robot and one that is not.
 
 use crate::body_cut::{Body, Preference, TouchesRobot};
+use crate::held::{LIGHT_TOOLS, is_light_touch, is_on_top, line_that_holds};
+use crate::layers::{N_BESIDE, N_FOLLOWED, N_FOLLOWED_NECK, N_LAYERS, THIN_NECK, layers_behind};
 use crate::thin::{LocalShape, is_line, spreads_of};
 use contract::Voxel;
 use std::collections::BTreeMap;
@@ -20,17 +22,7 @@ const MAX_LEVEL: [usize; 2] = [150, 400];
 const LEVELS_BESIDE: i32 = 3;
 /// Way along a body over which its voxels are counted as one layer, hundredths of a voxel's edge.
 const LAYER: u32 = 100;
-/// Number of layers of voxels behind a tip that show that the body is wider there: 6 cm.
-const N_LAYERS: usize = 3;
-/// Number of layers of voxels behind a cut that may be a part of the tool: 6 cm.
-const N_BESIDE: usize = 3;
-/// Number of layers of voxels behind a cut in which the end of a tool is looked for: the length of
-/// a finger, 10 cm, and that of a thin neck, 40 cm.
-const N_FOLLOWED: usize = 5;
-const N_FOLLOWED_NECK: usize = 20;
-/// Largest number of voxels in a layer of a thin neck, of 6 cm, and how many times longer than
-/// thick it is.
-const THIN_NECK: usize = 12;
+/// How many times longer than thick a thin neck is.
 const NECK_RATIO: f64 = 3.0;
 /// Least number of voxels in a layer of a neck with which what is behind it is compared.
 const LEAST_NECK: usize = 6;
@@ -38,14 +30,6 @@ const LEAST_NECK: usize = 6;
 /// Way along a body up to which its robot's side is held to be a tool where the cut is not at the
 /// end of something, hundredths of a voxel's edge (10 cm): the side may hold what stands beside it.
 const CERTAIN: u32 = 500;
-/// How many times more voxels a side has than touch it behind its cut, if it does not stand there.
-const LIGHT: usize = 18;
-/// How many times wider than there the body is within 10 cm behind such a cut.
-const WIDENS: usize = 3;
-/// Way along such a side, in longest tools: around a plate it is longer than a tool is.
-const LIGHT_TOOLS: u32 = 2;
-/// Largest distance of the hand from the middle of such a side, in mean distances of its voxels.
-const CENTRED: f64 = 0.6;
 
 /// To whom a voxel belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,10 +53,13 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let is_whole = is_whole(body, &near);
     let mut is_light = is_light_touch(body, &near);
     // Wide flat surfaces are cut off near the robot, also those of a plate that it holds.
-    if !is_light && is_light_touch(body, &far) && (is_on_top(body, &far) || hangs(body, &far)) {
+    let line = line_that_holds(body, &far).filter(|_| !is_light);
+    if !is_light && (is_light_touch(body, &far) && is_on_top(body, &far) || line.is_some()) {
         is_light = true;
         near.clone_from(&far);
     }
+    let on_line: Vec<bool> = line.unwrap_or_else(|| vec![false; n]);
+    near.iter_mut().zip(&on_line).for_each(|(near, line)| *near |= line);
     let is_tool = is_whole || is_light || is_like_a_tool(body, &near);
     let tip = up_to_where_it_widens(body, &near)
         .filter(|tip| is_tool && !is_light && is_like_a_tool(body, tip));
@@ -94,8 +81,8 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let share = |k: usize| {
         // Beside another link than a hand nothing is a tool.
         let held = if is_whole || body.from_hand[k].is_some() { held } else { held.min(MOUNT) };
-        let is_held = inside[k] && (body.length[k] <= held || is_hose(k));
-        match (near[k], far[k]) {
+        let is_held = inside[k] && (body.length[k] <= held || is_hose(k) || on_line[k]);
+        match (near[k], far[k] || on_line[k]) {
             (true, far) if is_held && (far || has_tip) => Share::Robot,
             (false, false) if body.is_fixed[k] => Share::Fixed,
             (false, false) if body.length[k] > doubt && !beside[k] => Share::Fixed,
@@ -136,66 +123,6 @@ fn is_like_a_tool(body: &Body<'_>, side: &[bool]) -> bool {
     !widths.keys().filter(|at| **at >= DOUBT / LAYER).any(is_wider) && !levels.keys().any(is_wide)
 }
 
-/// Whether a side touches what is behind its cut so little, for its size, that it does not stand on
-/// it: a plate of suction cups on a pile. Behind the cut the body must become wide at once, as legs
-/// of a bench do not, and the side must be centred beside the hand, as a bench rarely is.
-fn is_light_touch(body: &Body<'_>, side: &[bool]) -> bool {
-    let layers = layers_behind(body, side);
-    let n_touched = layers[0].len();
-    let is_own = |k: usize| side[k] && body.shape[k] != LocalShape::Hose;
-    let own: Vec<usize> = (0..side.len()).filter(|k| is_own(*k)).collect();
-    let n_own = own.len();
-    let widens = layers[..N_FOLLOWED].iter().any(|layer| layer.len() >= WIDENS * n_touched);
-    let is_near = own.iter().all(|k| body.length[*k] <= LIGHT_TOOLS * body.longest_tool);
-    let is_light = n_touched > 0 && n_own >= LIGHT * n_touched;
-    is_light && widens && is_near && is_centred(body, &own)
-}
-
-/// Whether what is behind the cut of a side faces up: the side rests on it. A bench whose legs are
-/// cut has sides of legs there.
-fn is_on_top(body: &Body<'_>, side: &[bool]) -> bool {
-    let layers = layers_behind(body, side);
-    let faces = layers[..N_BESIDE].iter().flatten().filter_map(|k| body.facet[*k].faces_up());
-    let (mut n, mut n_up) = (0, 0);
-    for faces_up in faces {
-        n += 1;
-        n_up += usize::from(faces_up);
-    }
-    n_up >= LEAST_NECK && 2 * n_up >= n
-}
-
-/// Whether a side hangs between the robot and a thin part, as one that a robot holds and a hose
-/// leads to: what stands is held from below.
-fn hangs(body: &Body<'_>, side: &[bool]) -> bool {
-    let is_at_cut = |k: &usize| body.graph.neighbours(*k).any(|(other, _)| !side[other]);
-    let own: Vec<usize> = (0..side.len()).filter(|k| side[*k]).collect();
-    let at_cut: Vec<usize> = own.iter().copied().filter(is_at_cut).collect();
-    let others: Vec<bool> = side.iter().map(|own| !own).collect();
-    let layers = layers_behind(body, &others);
-    let is_thin = layers[N_BESIDE..N_BESIDE + N_FOLLOWED]
-        .iter()
-        .all(|layer| (1..=THIN_NECK).contains(&layer.len()));
-    let height = |of: &[usize]| {
-        of.iter().map(|k| f64::from(body.graph.voxel(*k)[2])).sum::<f64>() / of.len() as f64
-    };
-    !at_cut.is_empty() && is_thin && height(&at_cut) > height(&own)
-}
-
-/// Whether voxels lie about those of them that touch the robot, seen from above.
-fn is_centred(body: &Body<'_>, own: &[usize]) -> bool {
-    let place = |k: &usize| body.graph.voxel(*k).map(f64::from);
-    let mean = |chosen: &[usize]| {
-        let sum = chosen.iter().map(place).fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);
-        sum.map(|v| v / chosen.len() as f64)
-    };
-    let touches = |k: &usize| body.contact[*k] != TouchesRobot::None;
-    let hand: Vec<usize> = own.iter().copied().filter(touches).collect();
-    let (hand, middle) = (mean(&hand), mean(own));
-    let away = |v: [f64; 3]| (v[0] - middle[0]).hypot(v[1] - middle[1]);
-    let spread = own.iter().map(|k| away(place(k))).sum::<f64>() / own.len() as f64;
-    away([hand[0], hand[1], 0.0]) <= CENTRED * spread
-}
-
 /// A side without its voxels beside the cut.
 fn inside(body: &Body<'_>, side: &[bool]) -> Vec<bool> {
     let is_inside = |k: usize| side[k] && body.graph.neighbours(k).all(|(other, _)| side[other]);
@@ -206,7 +133,7 @@ fn inside(body: &Body<'_>, side: &[bool]) -> Vec<bool> {
 /// where a tip touches a part: a finger is cut anywhere along its length. `None` if that is not
 /// found near the cut, or at the end of a straight thin neck.
 fn up_to_where_it_widens(body: &Body<'_>, side: &[bool]) -> Option<Vec<bool>> {
-    let layers = layers_behind(body, side);
+    let layers = layers_behind(body.graph, side);
     let width = |at: usize| layers[at].len();
     let mut narrowest = usize::MAX;
     let n_before = (0..N_FOLLOWED_NECK).find(|at| {
@@ -236,7 +163,7 @@ fn is_narrow(body: &Body<'_>, side: &[bool]) -> bool {
         }
     }
     widths.sort_unstable();
-    let layers = layers_behind(body, side);
+    let layers = layers_behind(body.graph, side);
     let behind = layers[..2].iter().map(Vec::len).min().unwrap_or(0);
     3 * behind <= 2 * widths[widths.len() / 2]
 }
@@ -254,28 +181,9 @@ fn widest_layer(body: &Body<'_>, side: &[bool]) -> usize {
 /// part of a tool behind its cut.
 fn beside(body: &Body<'_>, side: &[bool]) -> Vec<bool> {
     let mut beside = vec![false; side.len()];
-    let layers = layers_behind(body, side);
+    let layers = layers_behind(body.graph, side);
     layers.iter().take(N_BESIDE).flatten().for_each(|k| beside[*k] = true);
     beside
-}
-
-/// The voxels behind a cut in layers, the nearest first.
-fn layers_behind(body: &Body<'_>, side: &[bool]) -> Vec<Vec<usize>> {
-    let mut is_seen = side.to_vec();
-    let mut layer: Vec<usize> = (0..side.len()).filter(|k| side[*k]).collect();
-    let next = |_| {
-        let mut next = Vec::new();
-        for k in &layer {
-            for (other, _) in body.graph.neighbours(*k) {
-                if !std::mem::replace(&mut is_seen[other], true) {
-                    next.push(other);
-                }
-            }
-        }
-        layer.clone_from(&next);
-        next
-    };
-    (0..N_FOLLOWED_NECK + N_LAYERS).map(next).collect()
 }
 
 #[cfg(test)]

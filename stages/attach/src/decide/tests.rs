@@ -145,7 +145,11 @@ fn the_result_does_not_depend_on_the_order_of_parts() {
 }
 
 /// The outside of a box between two corners.
-pub(super) fn shell(min: Voxel, max: Voxel, voxel: impl Fn(Voxel) -> ResidualVoxel) -> Vec<ResidualVoxel> {
+pub(super) fn shell(
+    min: Voxel,
+    max: Voxel,
+    voxel: impl Fn(Voxel) -> ResidualVoxel,
+) -> Vec<ResidualVoxel> {
     let mut out = Vec::new();
     for x in min[0]..=max[0] {
         for y in min[1]..=max[1] {

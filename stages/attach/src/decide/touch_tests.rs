@@ -124,3 +124,28 @@ fn a_cut_follows_the_inner_corner() {
     assert!(4 * n_moving >= 3 * cup.len(), "{n_moving} of {}", cup.len());
     assert_eq!(n_of(&out, &part, PointKind::Attachment), 0);
 }
+
+/// A tool that holds a plate, which something else holds as well.
+fn held_plate(other: Vec<ResidualVoxel>) -> [Vec<ResidualVoxel>; 3] {
+    let tool = shell([-2, -2, -9], [2, 2, 0], below);
+    [tool, shell([-10, -10, -12], [10, 10, -10], below), other]
+}
+
+#[test]
+fn a_part_that_hangs_on_a_hand_and_a_hose_moves_and_one_on_a_post_does_not() {
+    let hose = (0..60).flat_map(|z| [[9, 9, z - 9], [9, 10, z - 9]]);
+    let hose = hose.map(|at| ResidualVoxel { at_border: at[2] == 50, ..voxel(at, 1, 10) });
+    let held = held_plate(hose.collect());
+    let out = attached(&held);
+    for (of, least) in held.iter().zip([95, 95, 80]) {
+        let n_moving = n_of(&out, of, PointKind::Attachment);
+        assert!(100 * n_moving >= least * of.len(), "{n_moving} of {}", of.len());
+    }
+    let held = held_plate(shell([-3, -3, -60], [3, 3, -13], |at| ResidualVoxel {
+        grounded: at[2] == -60,
+        ..below(at)
+    }));
+    let out = attached(&held);
+    assert_eq!(n_of(&out, &held[1], PointKind::Attachment), 0);
+    assert_eq!(n_of(&out, &held[2], PointKind::Attachment), 0);
+}
