@@ -8,6 +8,7 @@ use crate::facets::Facet;
 use crate::floating::{self, Bodies};
 use crate::settings::Settings;
 use crate::share::{Share, share};
+use crate::structure::{LEAST_STRUCTURE, beyond_hoses};
 use crate::thin::{self, LocalShape};
 use crate::voxel_graph::Graph;
 use contract::{Fit, Fold, Label, LinkAt, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
@@ -34,6 +35,23 @@ enum Reach {
     Touching,
     /// It touches none; voxels that are no farther from a hand, metres, may hang on it.
     Hidden(f32),
+}
+
+/// A component that may have to be cut.
+struct Component<'a> {
+    /// The graph of its voxels alone.
+    graph: Graph,
+    voxels: &'a [ResidualVoxel],
+    /// Its voxels, as indices.
+    members: &'a [usize],
+    reach: Reach,
+    /// For each of them, the way along the body from the robot, hundredths of a voxel's edge.
+    length: Vec<u32>,
+    shape: Vec<LocalShape>,
+    /// Way along the longest tool of the robot that it touches, same unit.
+    longest_tool: u32,
+    /// Whether each belongs to something large that only hoses lead to.
+    beyond_hose: Vec<bool>,
 }
 
 /// The voxels gathered so far. They are sorted and merged from time to time, so that memory grows
@@ -125,14 +143,19 @@ impl Attach {
         graph.shortest_paths(&robot, paths);
         let is_fixed = |at: usize| !in_contact(at) && self.is_fixed(&voxels[at]);
         let n_fixed = members.iter().filter(|at| is_fixed(**at)).count();
-        let is_cut = n_fixed >= MIN_FIXED || (n_fixed > 0 && n_fixed * FEW >= members.len());
+        let is_held = n_fixed >= MIN_FIXED || (n_fixed > 0 && n_fixed * FEW >= members.len());
+        let may_stand = is_held || members.len() >= LEAST_STRUCTURE;
+        let component = may_stand
+            .then(|| self.component(graph.part(members), (voxels, members, reach), paths, link));
+        let component = component.filter(|c| is_held || c.beyond_hose.contains(&true));
+        let is_cut = component.is_some();
         let is_hidden = matches!(reach, Reach::Hidden(_));
         if is_hidden && !is_cut {
             return;
         }
         let mut group = Group { link, n_attached: 0, n_uncertain: 0, n_points: 0, is_cut };
-        let sides = if is_cut {
-            self.cut(&graph.part(members), (voxels, members, reach), paths, link)
+        let sides = if let Some(component) = &component {
+            self.cut(component)
         } else if members.len() < self.settings.min_voxels {
             vec![Share::Open; members.len()]
         } else {
@@ -160,21 +183,33 @@ impl Attach {
         out.groups.push(group);
     }
 
-    /// Shares out a component that reaches something fixed; `graph` is that of the component alone.
-    fn cut(
+    /// What is asked of a component before it is cut; `graph` is that of the component alone.
+    fn component<'a>(
         &self,
-        graph: &Graph,
-        (voxels, members, reach): (&[ResidualVoxel], &[usize], Reach),
+        graph: Graph,
+        (voxels, members, reach): (&'a [ResidualVoxel], &'a [usize], Reach),
         paths: &[(u32, u32)],
         link: LinkAt,
-    ) -> Vec<Share> {
+    ) -> Component<'a> {
         let length: Vec<u32> = members.iter().map(|at| paths[*at].0).collect();
-        let shape = thin::shapes(graph, &length, self.settings.thin);
+        let shape = thin::shapes(&graph, &length, self.settings.thin);
         let longest_tool = self.tools.get(usize::from(link.robot)).copied().unwrap_or(0);
+        let is_at_robot = |k: usize| {
+            let voxel = &voxels[members[k]];
+            let is_at_hand = voxel.distance.is_finite() && is_among(&self.wrists, voxel.nearest);
+            is_at_hand || self.reaches(voxel, reach)
+        };
+        let beyond_hose = beyond_hoses(&graph, &shape, is_at_robot);
+        Component { graph, voxels, members, reach, length, shape, longest_tool, beyond_hose }
+    }
+
+    /// Shares out a component that reaches something fixed.
+    fn cut(&self, of: &Component<'_>) -> Vec<Share> {
+        let &Component { voxels, members, reach, longest_tool, .. } = of;
         // No tool and nothing that it holds is so far away, which bounds the time of the cuts.
         let too_far = (FAR_TOOLS * longest_tool).max(LEAST_FAR);
         let is_too_far = |k: usize| {
-            length[k] > too_far && matches!(shape[k], LocalShape::Body | LocalShape::Flat)
+            of.length[k] > too_far && matches!(of.shape[k], LocalShape::Body | LocalShape::Flat)
         };
         let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
             _ if !self.reaches(&voxels[*at], reach) => TouchesRobot::None,
@@ -183,41 +218,38 @@ impl Attach {
         };
         let is_fixed = |k: usize| {
             let voxel = &voxels[members[k]];
-            is_too_far(k) || !self.reaches(voxel, reach) && self.is_fixed(voxel)
+            let stands = !self.reaches(voxel, reach) && self.is_fixed(voxel);
+            stands || of.beyond_hose[k] || is_too_far(k)
         };
         let is_fixed = (0..members.len()).map(is_fixed).collect();
         share(&Body {
-            graph,
-            from_hand: self.ways_from_hand(graph, (voxels, members, reach), &length),
+            graph: &of.graph,
+            from_hand: self.ways_from_hand(of),
             longest_tool,
             thin: self.settings.thin,
             contact: members.iter().map(contact).collect(),
             is_fixed,
-            shape,
-            length,
+            shape: of.shape.clone(),
+            length: of.length.clone(),
             facet: members.iter().map(|at| Facet::of(&voxels[*at])).collect(),
         })
     }
 
     /// For each voxel of a component the way from a hand, where that is about as near as the
     /// nearest link: hoses along the wrist lead to a tool as well.
-    fn ways_from_hand(
-        &self,
-        graph: &Graph,
-        (voxels, members, reach): (&[ResidualVoxel], &[usize], Reach),
-        length: &[u32],
-    ) -> Vec<Option<u32>> {
+    fn ways_from_hand(&self, of: &Component<'_>) -> Vec<Option<u32>> {
+        let &Component { voxels, members, reach, .. } = of;
         let touches_hand = |at: &usize| {
             self.reaches(&voxels[*at], reach) && is_among(&self.wrists, voxels[*at].nearest)
         };
         let seeds: Vec<(usize, u32)> =
             (0..members.len()).filter(|k| touches_hand(&members[*k])).map(|k| (k, 0)).collect();
         let mut paths = vec![(u32::MAX, 0); members.len()];
-        graph.shortest_paths(&seeds, &mut paths);
+        of.graph.shortest_paths(&seeds, &mut paths);
         let is_near = |(path, length): (&(u32, u32), &u32)| {
             (path.0 <= length.saturating_add(BESIDE_HAND)).then_some(path.0)
         };
-        paths.iter().zip(length).map(is_near).collect()
+        paths.iter().zip(&of.length).map(is_near).collect()
     }
 
     /// Whether a voxel touches a link that moves.

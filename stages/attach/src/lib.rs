@@ -26,6 +26,7 @@ mod max_flow;
 mod near_voxels;
 mod settings;
 mod share;
+mod structure;
 mod thin;
 mod voxel_graph;
 

@@ -149,3 +149,18 @@ fn a_part_that_hangs_on_a_hand_and_a_hose_moves_and_one_on_a_post_does_not() {
     assert_eq!(n_of(&out, &held[1], PointKind::Attachment), 0);
     assert_eq!(n_of(&out, &held[2], PointKind::Attachment), 0);
 }
+
+#[test]
+fn a_column_to_which_a_hose_leads_stands_though_its_foot_is_hidden() {
+    // A hose from the arm, and a column of which only the upper part is seen.
+    let hose = (0..70).flat_map(|x| [[x, 0, 1], [x, 1, 1]]);
+    let hose: Vec<_> = hose.map(|at| voxel(at, 1, at[0])).collect();
+    let column = shell([70, -4, -50], [78, 4, 20], |at| ResidualVoxel {
+        distance: f32::INFINITY,
+        ..voxel(at, 1, at[0])
+    });
+    let out = attached(&[hose.clone(), column.clone()]);
+    assert_eq!(n_of(&out, &column, PointKind::Attachment), 0);
+    let n_moving = n_of(&out, &hose, PointKind::Attachment);
+    assert!(10 * n_moving >= 9 * hose.len(), "{n_moving} of {}", hose.len());
+}
