@@ -38,9 +38,9 @@ pub(crate) struct Facet {
 impl Facet {
     pub(crate) fn of(voxel: &ResidualVoxel) -> Self {
         let n = f64::from(voxel.n_residual.max(1));
-        let within = voxel.surface.places.map(|sum| sum as f64 / 256.0 / n);
+        let within = voxel.surface.places.map(|sum| f64::from(sum) / 256.0 / n);
         let at: [f64; 3] = std::array::from_fn(|i| f64::from(voxel.voxel[i]) + within[i]);
-        let sum = Vector::from(voxel.surface.normals.map(|sum| sum as f64 / 256.0));
+        let sum = Vector::from(voxel.surface.normals.map(|sum| f64::from(sum) / 256.0));
         let normal = (sum.norm() >= CLEAR).then(|| sum.normalize());
         Self { middle: Vector::from(at) * RESIDUAL_EDGE, normal }
     }

@@ -91,7 +91,7 @@ fn what_may_hang_on_a_hidden_flange_is_open() {
 }
 
 /// A voxel of a face that is seen with this normal.
-fn faced(at: Voxel, normal: [i64; 3]) -> ResidualVoxel {
+fn faced(at: Voxel, normal: [i32; 3]) -> ResidualVoxel {
     let surface = VoxelSurface { places: [640; 3], normals: normal.map(|v| 5 * 256 * v) };
     ResidualVoxel { surface, ..below(at) }
 }
