@@ -26,7 +26,7 @@ use crate::result::{copc, page};
 use crate::store::{Store, spatial_tiles};
 use contract::{Cluster, Fit, Input, Region, Result, Space};
 use export::{COPC, ReviewEntry};
-use ingest::{Before, KeepLooks, Sources};
+use ingest::{Before, Sources};
 use robot::Library;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -167,9 +167,9 @@ impl<'a> Run<'a> {
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let review = Review::of(job, &library.models)?;
         let looks = KeptLooks { digests, settings, folder: output.looks() };
-        let looks = self.shards.is_some().then_some(&looks as &dyn KeepLooks);
+        let looks = self.shards.is_some().then_some(&looks);
         let sources =
-            positions::open(job, Before::default(), looks, CloudOrder::Measured, engine)?.sources;
+            positions::open(job, Before::default(), looks, CloudOrder::Used, engine)?.sources;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         let has_tiles = |i: &Input| {

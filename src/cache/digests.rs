@@ -129,7 +129,8 @@ impl Digests {
         settings: &Settings,
     ) -> Option<Key> {
         let own = scans.iter().filter(|s| s.input == input.id);
-        let own = own.map(|s| words(&(s.source_id, &s.places, s.world_from_scan, s.lattice)));
+        let own =
+            own.map(|s| words(&(s.source_id, &s.places, &s.raster, s.world_from_scan, s.lattice)));
         let own: Vec<String> = own.collect();
         Some(Key::of("tiles", &[self.input(input)?, &own.join("\n"), &words(&settings.ingest)]))
     }
@@ -192,6 +193,11 @@ impl Digests {
     pub(crate) fn look_key(&self, at: usize, settings: &Settings) -> Key {
         let file = words(&self.files[at]);
         Key::of("look", &[&file, &self.others, &words(&settings.ingest)])
+    }
+
+    /// Key of what samples tell of all inputs together.
+    pub(crate) fn looks_key(&self, settings: &Settings) -> Key {
+        Key::of("looks", &[&words(&self.files), &self.others, &words(&settings.ingest)])
     }
 
     /// Waits until the modification time of each input is old enough to tell of later changes.

@@ -111,6 +111,7 @@ pub(super) fn bench_scanners(flags: &ScannersBenchFlags, common: &Common, say: &
         n_cases: flags.cases,
         n_setups: [1, usize::from(flags.scans)],
         n_beams: flags.beams as f64,
+        orders: flags.order.clone(),
     };
     say.result(&scanners(&bench, &means, &engine)?);
     Ok(exit::OK)

@@ -172,6 +172,9 @@ pub(super) struct ScannersBenchFlags {
     /// Greatest number of beams of a hall
     #[arg(long, value_name = "N", default_value_t = 8_000_000, value_parser = clap::value_parser!(u64).range(100_000..=200_000_000))]
     pub(super) beams: u64,
+    /// Only orders of points whose name has one of these parts, such as shuffled
+    #[arg(long, value_name = "PART", value_delimiter = ',')]
+    pub(super) order: Vec<String>,
     /// Output folder of rows and table
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,

@@ -20,7 +20,7 @@ pub(super) fn inspect(flags: &InspectFlags, common: &Common, say: &Say) -> Resul
     // A look at headers takes no time: only a person who asks for it waits for more.
     let job = Job { scanners, find_scanners: common.asks_for_scanners(), ..job };
     let sources =
-        positions::open(&job, Before::default(), None, CloudOrder::Measured, &engine)?.sources;
+        positions::open(&job, Before::default(), None, CloudOrder::Used, &engine)?.sources;
     let descriptions = ingest::describe(&sources, &AllThreads);
     if flags.json {
         let all = serde_json::json!({

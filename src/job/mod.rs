@@ -177,6 +177,14 @@ impl Means {
         usize::try_from(free).unwrap_or(usize::MAX)
     }
 
+    /// Memory for a sample of a cloud's points whose scanners are looked for, before anything else
+    /// is held, bytes: half of what the program itself leaves.
+    #[must_use]
+    pub fn sample_bytes(&self) -> usize {
+        let free = self.memory_bytes.saturating_sub(PROGRAM_BYTES) / 2;
+        usize::try_from(free).unwrap_or(usize::MAX)
+    }
+
     /// Memory for mapped pages of the store, bytes.
     #[must_use]
     pub fn store_bytes(&self) -> usize {

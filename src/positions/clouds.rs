@@ -8,7 +8,7 @@ use crate::engine::{AllThreads, Engine};
 use contract::{Format, MaskId, Result, Scan, ScannerPosition};
 use ingest::{KnownScanner, PointWindow, Sources, WindowSample};
 use serde::Serialize;
-use setups::{FoundSetups, RasterSetup, ScanWindow, Setup};
+use setups::{FoundRasters, FoundSetups, RasterSetup, ScanWindow, Setup};
 use std::path::Path;
 
 /// Number of windows of a cloud that are looked at first, and where these leave much unexplained or
@@ -44,6 +44,9 @@ pub struct CloudSetups {
     pub unknown: Option<String>,
     /// Share of the windows looked at that were measured from the setups.
     pub explained: f64,
+    /// Whether order leaves so much unexplained that the cloud is looked at without it.
+    #[serde(skip)]
+    pub is_open: bool,
 }
 
 /// A setup of a cloud.
@@ -81,28 +84,50 @@ impl CloudSetups {
 /// In which clouds setups are looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CloudOrder {
-    /// Whose points are in the order of measurement. Others cost seconds a million points, and no
-    /// run uses what is found in them.
+    /// Whose points are in the order of measurement; others cost a second a million points.
     Measured,
+    /// In these, and without order where a run can use what is found: where order tells of none.
+    Used,
     /// In all.
     Any,
 }
 
-/// Finds the setups of all clouds of an order whose scanner is not known.
+/// Finds the setups of all clouds of an order whose scanner is not known. Points without order are
+/// looked at in so many bytes.
 ///
 /// # Errors
 /// If an input is broken where it is read.
-pub fn find(sources: &Sources, order: CloudOrder, engine: &Engine) -> Result<Vec<CloudSetups>> {
+pub fn find(
+    sources: &Sources,
+    order: CloudOrder,
+    bytes: usize,
+    engine: &Engine,
+) -> Result<Vec<CloudSetups>> {
     let opened = sources.opened();
     let is_open = |scan: &&Scan| opened.iter().any(|input| input.id == scan.input);
     let unknown = sources.scans.iter().filter(is_open);
     let unknown: Vec<&Scan> = unknown
         .filter(|s| s.scanner == ScannerPosition::Unknown && s.stated_points != Some(0))
         .collect();
-    engine.each(unknown, |scan| of_cloud(sources, scan, order))
+    let mut clouds = engine.each(unknown.clone(), |scan| of_cloud(sources, scan))?;
+    if order == CloudOrder::Measured {
+        return Ok(clouds);
+    }
+    // One after the other: each takes much memory, and all threads.
+    let is_wanted = |(cloud, scan): &(&mut CloudSetups, &Scan)| {
+        let is_used = cloud.setups.is_empty() && is_alone(sources, scan);
+        cloud.is_open && (is_used || order == CloudOrder::Any)
+    };
+    for (cloud, scan) in clouds.iter_mut().zip(unknown).filter(is_wanted) {
+        engine.cancel.check()?;
+        let found = unordered::of_scan(sources, scan, bytes, engine)?;
+        cloud.add_unordered(sources, scan, &found);
+    }
+    Ok(clouds)
 }
 
-fn of_cloud(sources: &Sources, scan: &Scan, order: CloudOrder) -> Result<CloudSetups> {
+/// The setups of a cloud by the order of its points.
+fn of_cloud(sources: &Sources, scan: &Scan) -> Result<CloudSetups> {
     let (windows, found) = looked(sources, scan)?;
     let input = &sources.inputs[scan.input.0 as usize];
     let n_owned = found.owners.iter().filter(|owner| owner.is_some()).count();
@@ -111,34 +136,36 @@ fn of_cloud(sources: &Sources, scan: &Scan, order: CloudOrder) -> Result<CloudSe
     } else {
         vec![Ownership::Untold; found.setups.len()]
     };
-    let stem = stem(&input.path);
-    let name = match input.format {
-        Format::Las | Format::Laz => stem.clone(),
-        _ => scan.name.clone(),
-    };
+    let name = name_of_entries(sources, scan);
     let setups = found.setups.iter().zip(owned);
     let setups: Vec<SetupOfCloud> =
         setups.map(|(setup, own)| setup_of_cloud(setup, own, &name)).collect();
     let n_usable = setups.iter().filter(|setup| setup.is_usable).count();
-    let mut cloud = CloudSetups {
+    let explained = n_owned as f64 / windows.len().max(1) as f64;
+    Ok(CloudSetups {
         mask: scan.mask,
         input: input.path.display().to_string(),
         name: scan.name.clone(),
         setups,
         unknown: words::unknown(&found, is_alone(sources, scan), n_usable),
-        explained: n_owned as f64 / windows.len().max(1) as f64,
-    };
-    let is_open = 1.0 - cloud.explained > UNEXPLAINED && windows.len() >= FEWEST_WINDOWS;
-    if is_open && order == CloudOrder::Any {
-        cloud.add_unordered(sources, scan, &name)?;
+        explained,
+        is_open: 1.0 - explained > UNEXPLAINED && windows.len() >= FEWEST_WINDOWS,
+    })
+}
+
+/// The name by which entries of a scanners file mean a scan.
+fn name_of_entries(sources: &Sources, scan: &Scan) -> String {
+    let input = &sources.inputs[scan.input.0 as usize];
+    match input.format {
+        Format::Las | Format::Laz => stem(&input.path),
+        _ => scan.name.clone(),
     }
-    Ok(cloud)
 }
 
 impl CloudSetups {
-    /// Adds the setups that are found without the order of the points.
-    fn add_unordered(&mut self, sources: &Sources, scan: &Scan, name: &str) -> Result<()> {
-        let (found, n_points) = unordered::of_scan(sources, scan)?;
+    /// Adds the setups that are found without the order of the points, of which there are so many.
+    fn add_unordered(&mut self, sources: &Sources, scan: &Scan, of: &(FoundRasters, u64)) {
+        let (found, n_points) = of;
         let in_order = self.unknown.take().unwrap_or_default();
         let is_known = |setup: &RasterSetup| {
             let at: [f64; 3] = setup.world_from_scanner.translation.vector.into();
@@ -147,25 +174,45 @@ impl CloudSetups {
             };
             self.setups.iter().any(|other| off(other) < SAME_PLACE)
         };
-        let new: Vec<&RasterSetup> = found.setups.iter().filter(|s| !is_known(s)).collect();
-        self.unknown = match (self.setups.is_empty(), new.is_empty()) {
-            // What order tells stands.
-            (false, true) => Some(in_order).filter(|cause| !cause.is_empty()),
-            _ => Some(words::unknown_unordered(&in_order, &found)),
+        // What order tells stands, and tells whose the points are in another way.
+        let is_first = self.setups.is_empty();
+        let is_las = {
+            let format = sources.inputs[scan.input.0 as usize].format;
+            matches!(format, Format::Las | Format::Laz)
         };
+        // A raster keeps points from others only if all of them are used.
+        let is_sure = |s: &RasterSetup| s.sigma.iter().all(|sigma| *sigma <= MOST_SIGMA);
+        let are_sure = found.setups.iter().all(|s| s.raster.is_none() || is_sure(s));
+        let own = |i: usize, setup: &RasterSetup| match &setup.raster {
+            _ if !is_first || !is_alone(sources, scan) => Ownership::Untold,
+            _ if found.is_alone => Ownership::Whole,
+            _ if !is_las => Ownership::Untold,
+            None => Ownership::Scattered,
+            Some(_) if !are_sure => Ownership::Scattered,
+            Some(_) => Ownership::Raster((found.told(i) * *n_points as f64).round() as u64),
+        };
+        let name = name_of_entries(sources, scan);
+        let new = found.setups.iter().enumerate().filter(|(_, setup)| !is_known(setup));
+        let new: Vec<SetupOfCloud> =
+            new.map(|(i, setup)| raster_of_cloud(setup, own(i, setup), &name)).collect();
         if !new.is_empty() {
             self.explained = self.explained.max(found.explained);
         }
-        let new = new.into_iter().map(|setup| raster_of_cloud(setup, n_points, name));
+        self.unknown = if is_first || !new.is_empty() {
+            let is_open = new.iter().any(|setup| !setup.is_usable);
+            words::unknown_unordered(&in_order, found, is_open.then_some(is_las))
+        } else {
+            Some(in_order).filter(|cause| !cause.is_empty())
+        };
         self.setups.extend(new);
-        Ok(())
     }
 }
 
 /// A setup that was found without the order of the points.
-fn raster_of_cloud(setup: &RasterSetup, n_points: u64, name: &str) -> SetupOfCloud {
+fn raster_of_cloud(setup: &RasterSetup, ownership: Ownership, name: &str) -> SetupOfCloud {
     let axis = setup.world_from_scanner.rotation * geometry::Vector::z();
-    let n_own = (setup.evidence.share * n_points as f64).round() as u64;
+    let is_by_raster = matches!(ownership, Ownership::Raster(_));
+    let is_told = is_by_raster || ownership == Ownership::Whole;
     SetupOfCloud {
         position: setup.world_from_scanner.translation.vector.into(),
         sigma: setup.sigma,
@@ -173,14 +220,15 @@ fn raster_of_cloud(setup: &RasterSetup, n_points: u64, name: &str) -> SetupOfClo
         row_step_deg: setup.steps[1].to_degrees(),
         col_step_deg: Some(setup.steps[0].to_degrees()),
         evidence: words::raster_evidence(setup),
-        is_usable: false,
-        ownership: Ownership::Raster(n_own),
+        is_usable: is_told && setup.sigma.iter().all(|sigma| *sigma <= MOST_SIGMA),
+        ownership,
         entry: KnownScanner {
             point_source_id: None,
             name: Some(name.to_owned()),
             world_from_scan: setup.world_from_scanner,
             sigma: Some(setup.sigma),
             places: Vec::new(),
+            raster: setup.raster.clone().filter(|_| is_by_raster),
         },
     }
 }
@@ -232,7 +280,9 @@ fn setup_of_cloud(setup: &Setup, ownership: Ownership, name: &str) -> SetupOfClo
     let (point_source_id, places) = match &ownership {
         Ownership::Source(id) => (Some(*id), Vec::new()),
         Ownership::Places(places) => (None, places.clone()),
-        Ownership::Whole | Ownership::Untold | Ownership::Raster(_) => (None, Vec::new()),
+        Ownership::Whole | Ownership::Untold | Ownership::Raster(_) | Ownership::Scattered => {
+            (None, Vec::new())
+        }
     };
     SetupOfCloud {
         position: setup.position(),
@@ -248,6 +298,7 @@ fn setup_of_cloud(setup: &Setup, ownership: Ownership, name: &str) -> SetupOfClo
             world_from_scan: setup.world_from_scanner,
             sigma: Some(setup.sigma),
             places,
+            raster: None,
         },
         ownership,
     }

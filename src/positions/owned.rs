@@ -9,9 +9,11 @@ pub enum Ownership {
     Source(u16),
     /// Those at these places in the file: first and last of each stretch.
     Places(Vec<[u64; 2]>),
-    /// About so many points, which lie on its raster; they are in no order, so that a scanners file
-    /// cannot name them.
+    /// Those that lie on its raster, in no order, and surely on no other one's: about so many.
     Raster(u64),
+    /// Points in no order, of which so many scatter too much about the raster, or so many are those
+    /// of others, that it is open which are its own.
+    Scattered,
     /// It is not known, or cannot be said in a scanners file.
     Untold,
 }
@@ -29,7 +31,12 @@ impl Ownership {
                 format!("{n} points in {stretches} of the file")
             }
             Self::Raster(n) => {
-                format!("about {n} points lie on its raster, in no order: a run cannot use it yet")
+                format!("about {n} points, in no order, which lie on its raster and on no other one's")
+            }
+            Self::Scattered => {
+                "it is open which points are its own: they scatter about its raster, or too many are \
+                 those of others"
+                    .into()
             }
             Self::Untold => "it is open which points are its own".into(),
         }

@@ -1,35 +1,64 @@
 //! A sample of a cloud's points, and the setups in it, where the order of the points tells none.
 
-use crate::engine::AllThreads;
-use contract::{Result, Scan};
+use crate::engine::{AllThreads, Engine, Task};
+use crate::io::read_parts::InputReader;
+use contract::{Map, Result, Scan, Strip};
 use geometry::{Point, Vector};
 use ingest::{Sources, Want};
 use setups::FoundRasters;
 
-/// Largest number of points that are looked at: 240 MB.
+/// Largest number of points that are looked at: more do not make the answer better.
 const MOST: usize = 20_000_000;
+/// Memory for each of them, bytes: 12 of the sample, as many again while it is thinned, and up to
+/// 36 of the points of the floor while they are sorted.
+const POINT_BYTES: usize = 60;
 
-/// Setups of a scan from its points in any order, with the number of its points.
-pub(super) fn of_scan(sources: &Sources, scan: &Scan) -> Result<(FoundRasters, u64)> {
-    let mut sample = EvenSample::new(MOST);
-    let turn = scan.world_from_scan.rotation;
-    let is_level = turn.angle() < 1e-12;
-    for strip in sources.strips(scan.input, Want::Coordinates)? {
-        let strip = strip?;
-        if strip.scan != scan.id {
-            continue;
-        }
-        for p in strip.xyz {
-            let turned = || (turn * Vector::from(p.map(f64::from))).cast::<f32>().into();
-            sample.add(if is_level { p } else { turned() });
-        }
-    }
-    let mut found = setups::find_unordered(&sample.points, &AllThreads);
+/// Setups of a scan from its points in any order, with the number of its points. A sample of these
+/// is held in so many bytes.
+pub(super) fn of_scan(
+    sources: &Sources,
+    scan: &Scan,
+    bytes: usize,
+    engine: &Engine,
+) -> Result<(FoundRasters, u64)> {
+    let mut sample = EvenSample::new((bytes / POINT_BYTES).clamp(2, MOST));
+    let input = &sources.inputs[scan.input.0 as usize];
+    let reading = InputReader { sources, input, want: Want::Coordinates };
+    let task = Task::new("scanners").of(reading.amount());
+    reading.each(task, &Levelled(scan), None, &engine.quiet(), |strip| {
+        strip.into_iter().flat_map(|strip| strip.xyz).for_each(|p| sample.add(p));
+        Ok(())
+    })?;
+    let pool = engine.pool()?;
+    let find = || setups::find_unordered(&sample.points, bytes / 2, &AllThreads);
+    let mut found = pool.install(find);
     let origin = Point::from(scan.world_from_scan.translation.vector);
     for setup in &mut found.setups {
         setup.world_from_scanner.translation.vector += origin.coords;
     }
     Ok((found, sample.n_seen))
+}
+
+/// Turns the points of a scan so that the world's z is up; drops strips of other scans.
+struct Levelled<'a>(&'a Scan);
+
+impl Map for Levelled<'_> {
+    type In = Strip;
+    type Out = Option<Strip>;
+    type Scratch = ();
+
+    fn apply(&self, mut strip: Strip, (): &mut ()) -> Result<Option<Strip>> {
+        let turn = self.0.world_from_scan.rotation;
+        if strip.scan != self.0.id {
+            return Ok(None);
+        }
+        if turn.angle() > 1e-12 {
+            for p in &mut strip.xyz {
+                *p = (turn * Vector::from(p.map(f64::from))).cast::<f32>().into();
+            }
+        }
+        Ok(Some(strip))
+    }
 }
 
 /// Points evenly chosen from a stream of any length, the same ones each time.

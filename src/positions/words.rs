@@ -37,16 +37,25 @@ pub(super) fn raster_evidence(setup: &RasterSetup) -> String {
     )
 }
 
-/// Why points without order have no setup, or none that a run can use.
-pub(super) fn unknown_unordered(in_order: &str, found: &FoundRasters) -> String {
-    const UNUSED: &str = "positions were found, but the points are in no order, so that a scanners \
-         file cannot name those of each scanner";
-    match (found.setups.is_empty(), found.cause) {
-        (true, Some(cause)) => format!("{in_order}; {}", cause.words()),
-        (true, None) => in_order.to_owned(),
-        (false, Some(cause)) => format!("{UNUSED}; {}", cause.words()),
-        (false, None) => UNUSED.to_owned(),
+/// Why points without order have no setup, or none for some points, or why not all that were found
+/// can be used: `open` says whether the file is one of which points can be told apart by rasters.
+pub(super) fn unknown_unordered(
+    in_order: &str,
+    found: &FoundRasters,
+    open: Option<bool>,
+) -> Option<String> {
+    const OPEN: &str = "positions were found, but it is open which points are those of which \
+         scanner, or a position is too uncertain";
+    const FORMAT: &str = "positions were found, but only points of LAS and LAZ files can be told \
+         apart without their order: write the file as LAS";
+    let cause = found.cause.map(|cause| cause.words().to_owned());
+    if found.setups.is_empty() {
+        let all = [Some(in_order.to_owned()), cause].into_iter().flatten();
+        return Some(all.filter(|cause| !cause.is_empty()).collect::<Vec<_>>().join("; "));
     }
+    let open = open.map(|is_las| if is_las { OPEN } else { FORMAT }.to_owned());
+    let all: Vec<String> = open.into_iter().chain(cause).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
 /// Why there is no setup, or none for some points, or why those found cannot be used.

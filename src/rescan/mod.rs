@@ -161,7 +161,7 @@ impl Rescan<'_> {
         let settings = &job.means.settings;
         let library = library::load(&job.robots, &settings.robot, Some(models_kept), engine)?;
         let sources =
-            positions::open(job, base.state.before(), None, CloudOrder::Measured, engine)?.sources;
+            positions::open(job, base.state.before(), None, CloudOrder::Used, engine)?.sources;
         units::check_sizes(&library, &sources)?;
         sources.check_steps()?;
         Ok((library, sources))

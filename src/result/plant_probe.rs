@@ -24,6 +24,7 @@ pub(crate) fn body() -> Vec<u8> {
         name: "one".into(),
         source_id: Some(1),
         places: Vec::new(),
+        raster: None,
         scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::identity(),
         lattice: Some(contract::Lattice::new(0.01, 0.01, 0.0, 0.0)),

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file.
 const NAME: &str = "plant.bin";
 /// First bytes of the file: name and version of its format.
-pub(super) const FORMAT: &[u8] = b"stillpoint.plant/8\n";
+pub(super) const FORMAT: &[u8] = b"stillpoint.plant/9\n";
 
 /// Scans, floor and robots of a plant as a run has found them.
 #[derive(Debug, Clone, Serialize, Deserialize)]

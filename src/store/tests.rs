@@ -28,6 +28,7 @@ fn scan(id: u32, lattice: Option<Lattice>) -> Scan {
         name: format!("scan {id}"),
         source_id: None,
         places: Vec::new(),
+        raster: None,
         scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::new([10.0, f64::from(id), 1.0].into(), [0.0, 0.0, 0.3].into()),
         lattice,

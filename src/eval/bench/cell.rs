@@ -87,6 +87,7 @@ impl ScannedCell {
                 name: frame.name.clone(),
                 source_id: None,
                 places: Vec::new(),
+                raster: None,
                 scanner: contract::ScannerPosition::Stated,
                 world_from_scan: frame.world_from_scan,
                 lattice: Some(Lattice::new(step, step, row, col)),

@@ -25,6 +25,7 @@ pub mod fence;
 mod fit;
 mod label;
 mod lattice;
+mod point_raster;
 mod ptx;
 pub mod quote;
 mod residual;
@@ -47,6 +48,7 @@ pub use fit::{
 };
 pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};
+pub use point_raster::{OnRaster, PointRaster};
 pub use ptx::is_ptx_no_return;
 pub use residual::{LinkAt, PlaceRun, RESIDUAL_EDGE, ResidualVoxel, TileLabels, VoxelSurface};
 pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId, ScannerPosition};

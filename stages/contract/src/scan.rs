@@ -1,6 +1,6 @@
 //! Inputs, scans and masks: what the headers of the files say before any point is read.
 
-use crate::Lattice;
+use crate::{Lattice, PointRaster};
 use geometry::{Aabb, Pose};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -121,6 +121,8 @@ pub struct Scan {
     /// First and last places of the stretches of its points in its mask, ascending, where these
     /// tell the scans of a file apart; else empty.
     pub places: Vec<[u64; 2]>,
+    /// The raster of its points, where only this tells the scans of a LAS file apart.
+    pub raster: Option<PointRaster>,
     /// How the position of its scanner is known.
     pub scanner: ScannerPosition,
     /// Pose of the scanner in the world, metres. Where the scanner's position is unknown this is a

@@ -15,6 +15,7 @@ fn scan(id: u32, position: Option<[f64; 3]>) -> Scan {
         name: format!("scan {id}"),
         source_id: None,
         places: Vec::new(),
+        raster: None,
         scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::new(Vector::from(position.unwrap_or_default()), Vector::zeros()),
         lattice: position.map(|_| Lattice::new(0.002, 0.002, 0.0, 0.0)),

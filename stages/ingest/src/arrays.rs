@@ -140,6 +140,7 @@ impl ArrayReader {
             mask: 0,
             source_id: None,
             places: Vec::new(),
+            raster: None,
             position: match scanner_known {
                 true => ScannerPosition::Given,
                 false => ScannerPosition::Unknown,

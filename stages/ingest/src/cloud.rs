@@ -103,6 +103,7 @@ impl CloudFile {
             world_from_scan: frame.world_from_scan,
             scanner_known: frame.scanner_known,
             places: Vec::new(),
+            raster: None,
             position: frame.position(),
             stated_bounds: None,
             stated_points: n_points,

@@ -146,11 +146,21 @@ impl Decoder {
             self.add(&mut strip, records, first);
             return trimmed(strip).into_iter().collect();
         }
+        let by_raster: Vec<u16> = match &self.scan_of {
+            ScanOfPoint::ByRaster(rasters) => {
+                records.chunks_exact(self.record_len).map(|record| rasters.of(record)).collect()
+            }
+            _ => Vec::new(),
+        };
         let mut strips: Vec<Option<RawStrip>> = vec![None; self.frames.len()];
         // Points of one scan usually follow one another.
         let mut from = 0;
         while from < n {
-            let (own, to) = self.stretch(records, first, from, n);
+            let (own, to) =
+                match by_raster[from.min(by_raster.len())..].chunk_by(|a, b| a == b).next() {
+                    Some(same) => (usize::from(same[0]), from + same.len()),
+                    None => self.stretch(records, first, from, n),
+                };
             let strip = strips[own].get_or_insert_with(|| {
                 self.empty(own, first + from as u64, if from == 0 { n } else { 0 }, want)
             });
@@ -166,7 +176,7 @@ impl Decoder {
     /// The scan of a record, and the number of the first record behind it of another scan.
     fn stretch(&self, records: &[u8], first: u64, from: usize, n: usize) -> (usize, usize) {
         match &self.scan_of {
-            ScanOfPoint::One => (0, n),
+            ScanOfPoint::One | ScanOfPoint::ByRaster(_) => (0, n),
             ScanOfPoint::BySource(scans) => {
                 let scan = |i: usize| {
                     scans[usize::from(self.layout.source_id(&records[i * self.record_len..]))]

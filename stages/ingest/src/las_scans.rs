@@ -5,10 +5,11 @@ use crate::las_header::LasHeader;
 use crate::las_layout::RecordLayout;
 use crate::las_runs::LasRecords;
 use crate::place_look::PlaceLook;
+use crate::rasters_of_scans::{self, RastersOfScans};
 use crate::reader::ScanSeed;
 use crate::scan_of_point::{PlacesOfScans, ScanOfPoint};
 use crate::settings::Settings;
-use contract::{Result, ScannerPosition};
+use contract::{PointRaster, Result, ScannerPosition};
 use geometry::{Aabb, Pose};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -26,6 +27,8 @@ pub(crate) struct LasScanner {
     pub(crate) position: ScannerPosition,
     /// First and last places of the stretches of its points; empty where its source id tells.
     pub(crate) places: Vec<[u64; 2]>,
+    /// The raster of its points, where only this tells.
+    pub(crate) raster: Option<PointRaster>,
     /// Whether it may belong to another file, so that it is left out if no point of it is seen
     /// here.
     pub(crate) may_be_elsewhere: bool,
@@ -50,6 +53,9 @@ impl Census {
     }
 }
 
+/// Note on the points of a file that no raster claims alone.
+const SEVERAL: &str =
+    "points that lie on the rasters of several scanners, or surely on none, prove no free space";
 /// Largest number of records of which all source ids are read; of larger files only windows are.
 const CENSUS_ALL: u64 = 20_000_000;
 /// Number of windows.
@@ -79,15 +85,8 @@ pub(crate) fn find(
     let look = look(records)?;
     let whole = whole_extent(header);
     let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let mut notes = header.notes.clone();
     let step = crate::steps::coarse(&look.points);
-    notes.extend(step.map(crate::steps::note));
-    if look.bounds_wrong() && header.bounds.is_some() {
-        let (outside, n) = (look.outside, look.points.len());
-        notes.push(format!(
-            "the stated bounds are wrong: {outside} of {n} points looked at lie outside"
-        ));
-    }
+    let notes = notes(header, &look, step);
     let seed = |name: String, source_id: Option<u16>, pose: Option<Pose>| ScanSeed {
         name,
         mask: 0,
@@ -97,6 +96,7 @@ pub(crate) fn find(
         scanner_known: pose.is_some(),
         position: ScannerPosition::Unknown,
         places: Vec::new(),
+        raster: None,
         stated_bounds: header.bounds.filter(|_| !look.bounds_wrong()),
         stated_points: None,
         likely_points: None,
@@ -109,7 +109,9 @@ pub(crate) fn find(
         extents: Vec::new(),
         bounds_hold: look.outside == 0 && header.bounds.is_some(),
     };
-    if scanners.iter().any(|s| !s.places.is_empty()) {
+    if scanners.iter().any(|s| s.raster.is_some()) {
+        by_raster(&mut found, scanners, records, &stem, seed)?;
+    } else if scanners.iter().any(|s| !s.places.is_empty()) {
         by_place(&mut found, scanners, header, &stem, seed);
     } else if let Some(only) = scanners.iter().find(|s| s.source_id.is_none()) {
         let mut scan = seed(only.name.clone().unwrap_or(stem), None, Some(only.pose));
@@ -128,6 +130,19 @@ pub(crate) fn find(
     }
     found.scans.iter_mut().try_for_each(|scan| look.check(scan, settings))?;
     Ok(found)
+}
+
+/// What users should know of all scans of a file.
+fn notes(header: &LasHeader, look: &PlaceLook, step: Option<f64>) -> Vec<String> {
+    let mut notes = header.notes.clone();
+    notes.extend(step.map(crate::steps::note));
+    if look.bounds_wrong() && header.bounds.is_some() {
+        let (outside, n) = (look.outside, look.points.len());
+        notes.push(format!(
+            "the stated bounds are wrong: {outside} of {n} points looked at lie outside"
+        ));
+    }
+    notes
 }
 
 /// The first and last place of a file's records.
@@ -212,6 +227,40 @@ fn by_place(
         found.extents.push(whole);
     }
     found.scan_of = ScanOfPoint::ByPlace(by_place);
+}
+
+/// Makes a scan for each scanner whose points lie on a raster of its own, and one for all others.
+fn by_raster(
+    found: &mut FoundScans,
+    scanners: &[LasScanner],
+    records: &LasRecords,
+    stem: &str,
+    seed: impl Fn(String, Option<u16>, Option<Pose>) -> ScanSeed,
+) -> Result<()> {
+    let header = &records.header;
+    let whole = whole_extent(header);
+    let mut rasters = RastersOfScans::new(header);
+    for (scanner, raster) in scanners.iter().filter_map(|s| s.raster.as_ref().map(|r| (s, r))) {
+        let number = found.scans.len() + 1;
+        let name = scanner.name.clone().filter(|name| name != stem);
+        let mut scan =
+            seed(name.unwrap_or_else(|| format!("{stem} {number}")), None, Some(scanner.pose));
+        scan.position = scanner.position;
+        scan.raster = Some(raster.clone());
+        found.scans.push(scan);
+        found.extents.push(whole);
+        rasters.add(&scanner.pose, raster);
+    }
+    let shares = rasters_of_scans::shares(&rasters, records)?;
+    for (scan, share) in found.scans.iter_mut().zip(shares) {
+        scan.likely_points = Some((share * header.n_points as f64).round() as u64);
+    }
+    let mut rest = seed(format!("{stem} (rest)"), None, None);
+    rest.notes.push(SEVERAL.into());
+    found.scans.push(rest);
+    found.extents.push(whole);
+    found.scan_of = ScanOfPoint::ByRaster(rasters);
+    Ok(())
 }
 
 /// The stated bounds with a margin, since writers round them by up to a tenth of a unit.

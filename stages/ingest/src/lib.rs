@@ -55,6 +55,7 @@ mod ptx;
 mod raster;
 mod raster_free;
 mod raster_native;
+mod rasters_of_scans;
 mod reader;
 mod regular;
 mod sampling;

@@ -79,10 +79,12 @@ impl OpenFile {
         }
         let n_points = self.reader.scans()[i].likely_points.or(scan.stated_points);
         let raster = raster::estimate(&sample, n_points, settings);
-        // Rows and columns that are regular in angle prove the scanner's position.
-        if !raster.is_some_and(|raster| raster.steps == StepSource::Native)
-            && let Some(note) = self.misplaced(i)?
-        {
+        // Rows and columns that are regular in angle prove the scanner's position. So do points
+        // that are its own because they lie on its raster; only a part of each cell is known as
+        // such.
+        let is_proven = scan.raster.is_some()
+            || raster.is_some_and(|raster| raster.steps == StepSource::Native);
+        if !is_proven && let Some(note) = self.misplaced(i)? {
             let note = Some(note);
             return Ok(ScanLook { raster: None, note, spread, is_misplaced: true });
         }

@@ -20,6 +20,7 @@ pub(crate) fn new_scan<'a>(
         name: seed.name.clone(),
         source_id: seed.source_id,
         places: seed.places.clone(),
+        raster: seed.raster.clone(),
         scanner: seed.position,
         world_from_scan: seed.world_from_scan,
         lattice: None,

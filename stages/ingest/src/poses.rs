@@ -26,7 +26,9 @@ impl<'a> Poses<'a> {
     }
 
     pub(crate) fn by_scan_name(&mut self, name: &str) -> Option<&'a KnownScanner> {
-        let at = self.entries.iter().position(|e| e.name.as_deref() == Some(name))?;
+        // A raster tells points of LAS files apart only: the scan is not all of one scanner.
+        let is_own = |e: &KnownScanner| e.name.as_deref() == Some(name) && e.raster.is_none();
+        let at = self.entries.iter().position(is_own)?;
         self.used[at] = true;
         Some(&self.entries[at])
     }
@@ -42,16 +44,16 @@ impl<'a> Poses<'a> {
         let only = |e: &KnownScanner| {
             self.entries.len() == 1 && e.point_source_id.is_none() && !for_another(e)
         };
-        let by_place = |e: &KnownScanner| {
-            !e.places.is_empty() && (named(e) || (!self.several && !for_another(e)))
-        };
-        let is_whole = |e: &KnownScanner| e.point_source_id.is_none() && e.places.is_empty();
+        let is_part = |e: &KnownScanner| !e.places.is_empty() || e.raster.is_some();
+        let by_part =
+            |e: &KnownScanner| is_part(e) && (named(e) || (!self.several && !for_another(e)));
+        let is_whole = |e: &KnownScanner| e.point_source_id.is_none() && !is_part(e);
         let whole = |e: &KnownScanner| named(e) && is_whole(e);
         let chosen: Vec<usize> = match self.entries.iter().position(whole) {
             Some(at) => vec![at],
             None => {
                 let fits = |e: &KnownScanner| {
-                    (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e) || by_place(e)
+                    (named(e) && e.point_source_id.is_some()) || by_id(e) || only(e) || by_part(e)
                 };
                 (0..self.entries.len()).filter(|i| fits(&self.entries[*i])).collect()
             }
@@ -62,9 +64,8 @@ impl<'a> Poses<'a> {
             self.used[at] = true;
             // An entry with this file's name takes precedence over one that only shares the id.
             let is_twin = |s: &LasScanner| {
-                s.source_id == entry.point_source_id
-                    && s.places.is_empty()
-                    && entry.places.is_empty()
+                let is_whole = s.places.is_empty() && s.raster.is_none();
+                s.source_id == entry.point_source_id && is_whole && !is_part(entry)
             };
             let twin = scanners.iter().position(is_twin);
             let scanner = LasScanner {
@@ -73,6 +74,7 @@ impl<'a> Poses<'a> {
                 pose: entry.world_from_scan,
                 position: entry.position(),
                 places: entry.places.clone(),
+                raster: entry.raster.clone(),
                 may_be_elsewhere: self.several && !named(entry),
             };
             match twin {

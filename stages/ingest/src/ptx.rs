@@ -39,6 +39,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Result<Box<dyn Reader>> 
             world_from_scan: block.frame.world_from_scan,
             scanner_known: block.frame.scanner_known,
             places: Vec::new(),
+            raster: None,
             position: block.frame.position(),
             stated_bounds: None,
             stated_points: Some(block.n_valid),

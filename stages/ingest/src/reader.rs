@@ -4,7 +4,7 @@
 use crate::map::Mapped;
 use crate::oddities::Oddities;
 use crate::units::{ReferenceSystem, Units};
-use contract::{Attributes, Error, Format, Kind, Result, ScannerPosition};
+use contract::{Attributes, Error, Format, Kind, PointRaster, Result, ScannerPosition};
 use geometry::{Aabb, Pose};
 use std::ops::Range;
 
@@ -39,6 +39,8 @@ pub(crate) struct ScanSeed {
     pub(crate) source_id: Option<u16>,
     /// First and last places of the stretches of its points, where these tell scans apart.
     pub(crate) places: Vec<[u64; 2]>,
+    /// The raster of its points, where this tells scans apart.
+    pub(crate) raster: Option<PointRaster>,
     /// How the scanner's position is known: `Stated` or `Unknown`, or what a scanners file says of
     /// a LAS file.
     pub(crate) position: ScannerPosition,

@@ -1,5 +1,7 @@
-//! Tells to which scan of a LAS file a point belongs: by its source id, or by its place in the
-//! file.
+//! Tells to which scan of a LAS file a point belongs: by its source id, by its place in the file,
+//! or by the rasters of the scanners.
+
+use crate::rasters_of_scans::RastersOfScans;
 
 /// Which points of a file belong to which of its scans.
 #[derive(Debug)]
@@ -10,6 +12,8 @@ pub(crate) enum ScanOfPoint {
     BySource(Vec<u16>),
     /// By place.
     ByPlace(PlacesOfScans),
+    /// By the angles under which the scanners see it.
+    ByRaster(RastersOfScans),
 }
 
 /// Stretches of places, each of one scan, and the scan of all other places.

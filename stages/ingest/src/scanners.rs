@@ -2,11 +2,12 @@
 
 use crate::regular::read_text;
 use crate::settings::Settings;
-use contract::{Error, Kind, Result, ScannerPosition};
+use contract::{Error, Kind, PointRaster, Result, ScannerPosition};
 use geometry::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::Path;
 
 /// Largest number of entries of a file: LAS can tell no more sources apart.
@@ -27,6 +28,9 @@ pub struct KnownScanner {
     /// First and last places of the stretches of its points in a LAS file, ascending, where no
     /// source id tells them apart; else empty.
     pub places: Vec<[u64; 2]>,
+    /// The raster of its points in a LAS file, where neither a source id nor their order tells them
+    /// apart.
+    pub raster: Option<PointRaster>,
 }
 
 impl KnownScanner {
@@ -71,6 +75,25 @@ struct ScannerText {
     /// apart: first and last of each stretch, counted from 0, ascending.
     #[serde(default)]
     places: Vec<[u64; 2]>,
+    /// The raster of the scanner's beams as it was found, where neither a `point_source_id` nor the
+    /// order of a LAS or LAZ file tells its points apart.
+    raster: Option<RasterText>,
+}
+
+/// The raster of a scanner's beams: its points lie on it, and clearly beside those of the others.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RasterText {
+    /// Azimuth between columns and elevation between rows, degrees.
+    steps_deg: [f64; 2],
+    /// Azimuth of a column in each of so many equal sectors from −180° on, as a share of the step.
+    columns: Vec<f64>,
+    /// Elevation of a row in each of so many equal bands from −90° on, as a share of the step.
+    rows: Vec<f64>,
+    /// Deviation of azimuth and elevation up to which a point counts as on the raster, steps.
+    within: [f64; 2],
+    /// Deviation up to which a point on the raster of another scanner may be of this one, steps.
+    apart: [f64; 2],
 }
 
 impl KnownScanners {
@@ -89,7 +112,7 @@ impl KnownScanners {
     /// # Errors
     /// As [`KnownScanners::read`].
     pub fn parse(text: &str) -> Result<Self> {
-        const HINT: &str = "an entry has position, and may have name, point_source_id, quaternion_wxyz, sigma and places";
+        const HINT: &str = "an entry has position, and may have name, point_source_id, quaternion_wxyz, sigma, places and raster";
         let file: ScannersFile = if text.trim_start().starts_with('{') {
             serde_json::from_str(text)
                 .map_err(|e| Error::bad_input("wrong JSON").because(e).hint(HINT))?
@@ -108,7 +131,8 @@ impl KnownScanners {
         for (i, entry) in file.scanner.into_iter().enumerate() {
             let entry = entry.check().map_err(|e| e.at(format!("scanner {}", i + 1)))?;
             let key = (entry.point_source_id, entry.name.clone(), entry.places.first().copied());
-            let twin = known.insert(key, i);
+            // Scanners of one file that rasters tell apart share all that names them.
+            let twin = if entry.raster.is_some() { None } else { known.insert(key, i) };
             if let Some(twin) = twin {
                 return Err(Error::new(
                     Kind::BadInput,
@@ -142,6 +166,18 @@ impl KnownScanner {
         let lines: Vec<String> = pairs.chunks(6).map(|line| line.join(", ")).collect();
         let is_by_place = !self.places.is_empty();
         add("places", is_by_place.then(|| format!("[\n  {},\n]", lines.join(",\n  "))));
+        if let Some(raster) = &self.raster {
+            let list = |values: &[f64]| {
+                let all: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();
+                let lines: Vec<String> = all.chunks(12).map(|line| line.join(", ")).collect();
+                format!("[\n  {},\n]", lines.join(",\n  "))
+            };
+            let (r, [columns, rows]) = (raster, &raster.phases);
+            text.push_str("[scanner.raster]\n");
+            let _ = writeln!(text, "steps_deg = {:?}", r.steps.map(f64::to_degrees));
+            let _ = writeln!(text, "columns = {}\nrows = {}", list(columns), list(rows));
+            let _ = writeln!(text, "within = {:?}\napart = {:?}", r.within, r.apart);
+        }
         text
     }
 }
@@ -174,6 +210,7 @@ impl ScannerText {
                 "places must be pairs of first and last place, each after the one before",
             ));
         }
+        let raster = self.raster.map(RasterText::check).transpose()?;
         let [x, y, z] = self.position;
         Ok(KnownScanner {
             point_source_id: self.point_source_id,
@@ -181,6 +218,36 @@ impl ScannerText {
             world_from_scan: Pose::from_parts(Translation3::new(x, y, z), turn),
             sigma: self.sigma,
             places: self.places,
+            raster,
+        })
+    }
+}
+
+impl RasterText {
+    fn check(self) -> Result<PointRaster> {
+        /// Steps of scanners, with a margin, degrees.
+        const STEPS: std::ops::RangeInclusive<f64> = 1e-4..=10.0;
+        let bad = |what: String| Error::bad_input(what).at("raster");
+        if let Some(step) = self.steps_deg.iter().find(|step| !STEPS.contains(*step)) {
+            return Err(bad(format!("steps_deg must be from 0.0001 to 10, not \"{step}\"")));
+        }
+        let is_list = |phases: &[f64]| {
+            (1..=PointRaster::MOST_PHASES).contains(&phases.len())
+                && phases.iter().all(|v| v.is_finite())
+        };
+        if !is_list(&self.columns) || !is_list(&self.rows) {
+            let most = PointRaster::MOST_PHASES;
+            return Err(bad(format!("columns and rows must be lists of 1 to {most} numbers")));
+        }
+        let both = self.within.iter().chain(&self.apart);
+        if let Some(value) = both.clone().find(|v| !(0.0..=0.5).contains(*v)) {
+            return Err(bad(format!("within and apart must be from 0 to 0.5, not \"{value}\"")));
+        }
+        Ok(PointRaster {
+            steps: self.steps_deg.map(f64::to_radians),
+            phases: [self.columns, self.rows],
+            within: self.within,
+            apart: self.apart,
         })
     }
 }
@@ -216,7 +283,13 @@ mod tests {
         let text = "[[scanner]]\nname = 'a\"b'\nposition = [4.9, 1e-7, 5000000.25]\n\
                     quaternion_wxyz = [0.6, 0, 0, 0.8]\nsigma = [1e-4, 2e-4, 3e-5]\n\
                     places = [[0, 7], [9, 9], [11, 12345678901]]\n\
-                    [[scanner]]\npoint_source_id = 7\nposition = [0, 0, 0.5]\n";
+                    [[scanner]]\npoint_source_id = 7\nposition = [0, 0, 0.5]\n\
+                    [[scanner]]\nname = 'c'\nposition = [0, 0, 1]\n[scanner.raster]\n\
+                    steps_deg = [0.1, 0.05]\ncolumns = [0.5, 0.25]\nrows = [0]\n\
+                    within = [0.06, 0.1]\napart = [0.2, 0.25]\n\
+                    [[scanner]]\nname = 'c'\nposition = [4, 0, 1]\n[scanner.raster]\n\
+                    steps_deg = [0.3, 0.3]\ncolumns = [0.5]\nrows = [0.1]\n\
+                    within = [0.06, 0.1]\napart = [0.2, 0.25]\n";
         let read = KnownScanners::parse(text).unwrap();
         let remarks = ["found from 3 planes".to_string()];
         let again: String = read.entries.iter().map(|e| e.to_toml(&remarks) + "\n").collect();
@@ -226,6 +299,12 @@ mod tests {
 
     #[test]
     fn wrong_entries_are_named() {
+        let raster = |step: &str, columns: &str, within: &str| {
+            format!(
+                "[[scanner]]\nposition = [0, 0, 0]\n[scanner.raster]\nsteps_deg = [{step}, 0.1]\n\
+                 columns = {columns}\nrows = [0]\nwithin = [{within}, 0.1]\napart = [0.2, 0.2]"
+            )
+        };
         for (text, word) in [
             ("[[scanner]]\nposition = [0, 0, nan]", "finite"),
             ("[[scanner]]\nposition = [0, 0, 0]\nquaternion_wxyz = [0, 0, 0, 0]", "rotation"),
@@ -236,6 +315,12 @@ mod tests {
             ("[[scanner]]\nposition = [0,0,0]\nsigma = [1e-4, -1e-4, 0]", "sigma"),
             ("[[scanner]]\nposition = [0,0,0]\nplaces = [[5, 9], [9, 12]]", "places"),
             ("[[scanner]]\nposition = [0,0,0]\nplaces = [[5, 4]]", "places"),
+            ("[[scanner]]\nposition = [0,0,0]\nraster = {}", "steps_deg"),
+            (&raster("0.1", "[0.5]", "0.6"), "0.6"),
+            (&raster("0", "[0.5]", "0.1"), "steps_deg"),
+            (&raster("nan", "[0.5]", "0.1"), "steps_deg"),
+            (&raster("0.1", "[]", "0.1"), "columns"),
+            (&raster("0.1", "[inf]", "0.1"), "columns"),
             ("{", "JSON"),
             ("", "scanner"),
         ] {

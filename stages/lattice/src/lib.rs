@@ -17,7 +17,7 @@
 //!     pixel.push((row * 256 + col) as u16);
 //! }
 //! # let scan = Scan { id: ScanId(0), input: contract::InputId(0), mask: MaskId(0), notes: vec![],
-//! #     name: String::new(), source_id: None, places: vec![], world_from_scan: Pose::identity(),
+//! #     name: String::new(), source_id: None, places: vec![], raster: None, world_from_scan: Pose::identity(),
 //! #     scanner: contract::ScannerPosition::Stated,
 //! #     lattice: Some(lattice), stated_bounds: None, stated_points: None };
 //! let n_all = xyz.len() as u64;

@@ -143,6 +143,7 @@ fn scan(world_from_scan: Pose) -> Scan {
         name: "s".into(),
         source_id: None,
         places: Vec::new(),
+        raster: None,
         scanner: contract::ScannerPosition::Stated,
         world_from_scan,
         lattice: Some(Lattice::new(0.0015, 0.0015, 0.0, 0.0)),

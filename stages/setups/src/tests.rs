@@ -90,8 +90,11 @@ impl Room {
 #[derive(Clone, Copy)]
 pub(crate) struct Errors {
     noise: f64,
-    jitter: f64,
-    ripple: f64,
+    pub(crate) jitter: f64,
+    /// Amplitude of the graduation errors, and how many of them a turn has, of azimuth and of
+    /// elevation.
+    pub(crate) ripple: f64,
+    pub(crate) waves: [f64; 2],
     tilt: f64,
     lost: f64,
     pub(crate) step: f64,
@@ -102,6 +105,7 @@ pub(crate) const PLAIN: Errors = Errors {
     noise: 0.002,
     jitter: 5e-5,
     ripple: 2e-5,
+    waves: [0.0, 7.0],
     tilt: 0.03,
     lost: 0.05,
     step: 0.0021,
@@ -133,8 +137,10 @@ pub(crate) fn scan(
         let azimuth = f64::from(col) * e.step;
         for row in 0..n_rows {
             let stated = (f64::from(row) + phase) * e.step - 1.05;
-            let rise = stated + e.jitter * random.normal() + e.ripple * (7.0 * stated).sin();
-            let off = azimuth + e.jitter * random.normal() / rise.cos().abs().max(0.02);
+            let rise = stated + e.jitter * random.normal() + e.ripple * (e.waves[1] * stated).sin();
+            let off = azimuth
+                + e.ripple * (e.waves[0] * azimuth).sin()
+                + e.jitter * random.normal() / rise.cos().abs().max(0.02);
             let local = Vector::new(rise.cos() * off.cos(), rise.cos() * off.sin(), rise.sin());
             let along = pose.rotation * local;
             let range = room.range(at, &along) + e.noise * random.normal();

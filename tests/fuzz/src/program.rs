@@ -75,6 +75,7 @@ pub fn small_store(dir: &Path) {
         name: "one".into(),
         source_id: None,
         places: Vec::new(),
+        raster: None,
         scanner: contract::ScannerPosition::Unknown,
         world_from_scan: Pose::identity(),
         lattice: None,

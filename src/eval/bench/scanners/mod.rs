@@ -8,9 +8,9 @@ use super::cases::{CaseToRun, Cases};
 use super::request::DrawnCases;
 use crate::engine::Engine;
 use crate::job::{Job, Means};
-use crate::positions::{self, CloudOrder, CloudSetups, Ownership};
+use crate::positions::{self, CloudOrder, CloudSetups, Ownership, SetupOfCloud};
 use cloud::{DrawnCloud, Order};
-use contract::{Error, Result};
+use contract::{Error, PointRaster, Result};
 use row::{FoundScanners, ScannersRow};
 use std::path::Path;
 use std::time::Instant;
@@ -26,6 +26,8 @@ pub struct ScannersBench {
     pub n_setups: [usize; 2],
     /// Greatest number of beams of a hall.
     pub n_beams: f64,
+    /// Parts of the names of orders; all where there is none.
+    pub orders: Vec<String>,
 }
 
 /// Number of points from which on a setup is to be found in any order.
@@ -61,7 +63,10 @@ fn hall(
     let of = |order| DrawnCloud::drawn(row.seed, bench.n_setups, bench.n_beams, order, engine);
     let drawn = of(None)?;
     row.drawn = drawn.drawn.clone();
-    for order in Order::ALL {
+    let is_wanted = |order: &Order| {
+        bench.orders.is_empty() || bench.orders.iter().any(|part| order.word().contains(part))
+    };
+    for order in Order::ALL.into_iter().filter(is_wanted) {
         engine.cancel.check()?;
         let other = match order {
             Order::Carried => Some(DrawnCloud::carried(row.seed, engine)?),
@@ -76,7 +81,8 @@ fn hall(
         let job = Job { find_scanners: false, ..job };
         let opened =
             positions::open(&job, ingest::Before::default(), None, CloudOrder::Measured, engine)?;
-        let found = positions::find(&opened.sources, CloudOrder::Any, engine)?;
+        let found =
+            positions::find(&opened.sources, CloudOrder::Any, means.sample_bytes(), engine)?;
         let seconds = started.elapsed().as_secs_f64();
         row.orders.push(compared(&cloud, order, &found, seconds));
         let _ = std::fs::remove_file(path);
@@ -99,9 +105,10 @@ fn compared(
         unknown: found.iter().find_map(|cloud| cloud.unknown.clone()),
         ..FoundScanners::default()
     };
-    let setups = found.iter().flat_map(|cloud| &cloud.setups);
+    let setups: Vec<&SetupOfCloud> = found.iter().flat_map(|cloud| &cloud.setups).collect();
+    let owners = cloud.owners(&setups);
     let mut is_found = vec![false; cloud.scanners.len()];
-    for setup in setups {
+    for (number, setup) in setups.into_iter().enumerate() {
         let off = |truth: &[f64; 3]| [0, 1, 2].map(|a| setup.position[a] - truth[a]);
         let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
         let offs = cloud.scanners.iter().map(off).enumerate();
@@ -118,7 +125,8 @@ fn compared(
         out.sigmas_mm.push(length(setup.sigma) * 1e3);
         let ratios = off.iter().zip(&setup.sigma).map(|(off, sigma)| (off / sigma).abs());
         out.ratios.extend(ratios);
-        let [right, wrong] = cloud.owned(&setup.ownership, truth);
+        let by_raster = owners.iter().map(|owner| *owner == Some(number));
+        let [right, wrong] = cloud.owned(&setup.ownership, truth, by_raster);
         out.n_right += right;
         out.n_wrong += wrong;
     }
@@ -133,7 +141,12 @@ fn compared(
 
 impl DrawnCloud {
     /// Number of points that an ownership gives to a setup, rightly and wrongly.
-    fn owned(&self, ownership: &Ownership, truth: usize) -> [usize; 2] {
+    fn owned(
+        &self,
+        ownership: &Ownership,
+        truth: usize,
+        by_raster: impl Iterator<Item = bool>,
+    ) -> [usize; 2] {
         let mut counts = [0, 0];
         let mut count = |i: usize| counts[usize::from(usize::from(self.scan[i]) != truth)] += 1;
         match ownership {
@@ -146,8 +159,36 @@ impl DrawnCloud {
                 let own = places.iter().flat_map(|[first, last]| *first as usize..=*last as usize);
                 own.filter(|i| *i < self.points.len()).for_each(&mut count);
             }
-            Ownership::Untold | Ownership::Raster(_) => {}
+            Ownership::Raster(_) => {
+                (0..self.points.len())
+                    .zip(by_raster)
+                    .filter(|(_, is)| *is)
+                    .for_each(|(i, _)| count(i));
+            }
+            Ownership::Untold | Ownership::Scattered => {}
         }
         counts
+    }
+
+    /// The setup to which each point is given by its raster, where rasters tell.
+    fn owners(&self, setups: &[&SetupOfCloud]) -> Vec<Option<usize>> {
+        let entries = setups.iter().enumerate().filter_map(|(i, setup)| {
+            let raster = setup.entry.raster.as_ref().filter(|_| setup.is_usable)?;
+            Some((i, raster, setup.entry.world_from_scan.inverse()))
+        });
+        let entries: Vec<_> = entries.collect();
+        if entries.is_empty() {
+            return Vec::new();
+        }
+        // As files round coordinates.
+        let blur = 0.289 * self.drawn.quantum;
+        let owner = |p: &[f64; 3]| {
+            let p = p.map(|v| (v / self.drawn.quantum).round() * self.drawn.quantum);
+            let seen = entries.iter().map(|(_, raster, scanner_from_world)| {
+                (*raster, (scanner_from_world * nalgebra::Point3::from(p)).coords.into())
+            });
+            PointRaster::owner(seen, blur).map(|at| entries[at].0)
+        };
+        self.points.iter().map(owner).collect()
     }
 }

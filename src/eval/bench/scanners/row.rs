@@ -77,8 +77,8 @@ pub(super) fn table(rows: &[ScannersRow]) -> String {
     let mut text = String::from(
         "| order | clouds | setups | found | of ≥ 1 M points | twins | invented | error, mm: median | \
          95 % | worst | \
-         error by sigma: median | 95 % | points to their setup | to another | s a cloud |\n\
-         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+         error by sigma: median | 95 % | 98 % | points to their setup | to another | s a cloud |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let mut orders: Vec<&str> = Vec::new();
     for order in rows.iter().flat_map(|row| &row.orders) {
@@ -107,6 +107,7 @@ pub(super) fn table(rows: &[ScannersRow]) -> String {
             at(&errors, 1.0, 3),
             at(&ratios, 0.5, 2),
             at(&ratios, 0.95, 2),
+            at(&ratios, 0.98, 2),
             share(sum(|o| o.n_right)),
             share(sum(|o| o.n_wrong)),
             fixed(seconds, 2),

@@ -62,6 +62,7 @@ impl E57Scan {
             mask: 0,
             source_id: None,
             places: Vec::new(),
+            raster: None,
             position: scan.frame.position(),
             world_from_scan: scan.frame.world_from_scan,
             scanner_known: scan.frame.scanner_known,

@@ -92,6 +92,7 @@ pub fn scan(position: [f64; 3], yaw: f64, step: f64) -> Scan {
         name: "room".into(),
         source_id: None,
         places: Vec::new(),
+        raster: None,
         scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::new(Vector::from(position), Vector::z() * yaw),
         lattice: Some(Lattice::new(step, step, 0.0, 0.0)),

@@ -4,8 +4,11 @@
 use super::floor::FloorPoints;
 use super::foot::{self, RING};
 use super::judge;
+use super::owners;
 use super::raster::{RasterEvidence, RasterSetup};
-use super::solve::{CombComparison, RasterFit, improved, position_covariance, single};
+use super::solve::{
+    CombComparison, RasterFit, coherence, deviations, improved, position_covariance, single,
+};
 use super::votes::FootVote;
 use geometry::{Pose, Vector};
 use std::collections::BTreeMap;
@@ -25,6 +28,8 @@ const CLEAR_FLOOR: f64 = 20.0;
 const COHERENT: [f64; 2] = [0.1, 0.3];
 /// Greatest angle between the axis and the normal of the floor, radians.
 const MOST_LEAN: f64 = 0.35;
+/// Largest step of a raster, radians.
+const MOST_STEP: f64 = 0.02;
 /// Largest distance of a point that is compared all round, metres.
 const FAR: f64 = 15.0;
 /// Cells of direction over which phases are free, from step to step, radians.
@@ -33,7 +38,7 @@ const ELEVATION_CELLS: [[f64; 2]; 5] =
     [[0.05, 0.1], [0.1, 0.2], [0.3, 0.4], [1.0, 2.0], [7.0, 7.0]];
 const ALL_CELLS: [[f64; 2]; 3] = [[0.1, 0.1], [0.3, 0.3], SHARED];
 /// Elevations share one phase; azimuths do on either side of where a scan begins and ends.
-const SHARED: [f64; 2] = [1.6, 7.0];
+const SHARED: [f64; 2] = [0.4, 7.0];
 /// Cut-offs of residuals, steps: while a place is looked for, and when it is known.
 const WIDE: f64 = 0.35;
 const NARROW: f64 = 0.2;
@@ -87,7 +92,7 @@ pub(crate) fn certified(
     let coherence = [fit.1, best.1];
     let is_plain = |fit: &RasterFit| {
         let lean = (fit.pose.rotation * Vector::z()).z.clamp(-1.0, 1.0).acos();
-        lean < MOST_LEAN && fit.steps.iter().all(|s| *s > 1e-4 && *s < 0.02)
+        lean < MOST_LEAN && fit.steps.iter().all(|s| *s > 1e-4 && *s < MOST_STEP)
     };
     if coherence[0] < COHERENT[0] || coherence[1] < COHERENT[1] || !is_plain(&best.0) {
         return None;
@@ -104,8 +109,8 @@ fn in_plan(place: foot::FootPeak, points: &[[f64; 3]]) -> (RasterFit, f64) {
     let mut coherence = 0.0;
     for cell in AZIMUTH_CELLS {
         let how = CombComparison { cell, cut: WIDE, uses: [true, false] };
-        let (next, compared) = improved(fit, points, &how, |_| single([0, 1, 5]), ROUNDS);
-        (fit, coherence) = (next, compared.coherence[0]);
+        let (next, clear) = improved(fit, points, &how, |_| single([0, 1, 5]), ROUNDS);
+        (fit, coherence) = (next, clear[0]);
     }
     (fit, coherence)
 }
@@ -116,8 +121,8 @@ fn above(mut fit: RasterFit, columns: &[[f64; 3]]) -> (RasterFit, f64) {
     for cell in ELEVATION_CELLS {
         let how = CombComparison { cell, cut: WIDE, uses: [false, true] };
         let along = |fit: &RasterFit| [fit.about_foot().to_vec(), single([6])].concat();
-        let (next, compared) = improved(fit, columns, &how, along, ROUNDS);
-        (fit, coherence) = (next, compared.coherence[1]);
+        let (next, clear) = improved(fit, columns, &how, along, ROUNDS);
+        (fit, coherence) = (next, clear[1]);
     }
     (fit, coherence)
 }
@@ -129,6 +134,7 @@ fn round_about(mut fit: RasterFit, floor: &[[f64; 3]], all_round: &[[f64; 3]]) -
         let how = CombComparison { cell, cut: WIDE, uses: [true; 2] };
         fit = improved(fit, floor, &how, everything, ROUNDS).0;
     }
+    fit = with_whole_steps(fit, floor);
     for cell in [[0.15, 0.15], SHARED] {
         let near = on_raster(&fit, all_round, cell, 2.0 * NARROW);
         let how = CombComparison { cell, cut: WIDE, uses: [true; 2] };
@@ -138,6 +144,25 @@ fn round_about(mut fit: RasterFit, floor: &[[f64; 3]], all_round: &[[f64; 3]]) -
     let near = on_raster(&fit, all_round, SHARED, cut);
     let how = CombComparison { cell: SHARED, cut: 1.2 * cut, uses: [true; 2] };
     improved(fit, &near, &how, everything, ROUNDS).0
+}
+
+/// The fit with the steps of which those that were found may be parts: angles that lie on every
+/// other tooth only lie on a comb of twice the step, too, and more closely.
+fn with_whole_steps(mut fit: RasterFit, points: &[[f64; 3]]) -> RasterFit {
+    /// Cells in which phases are free, radians.
+    const CELL: [f64; 2] = [0.2, 0.2];
+    /// Parts of a step that are tried, one after the other.
+    const PARTS: [f64; 3] = [2.0, 2.0, 3.0];
+    let how = CombComparison { cell: CELL, cut: WIDE, uses: [true; 2] };
+    for (kind, part) in (0..2).flat_map(|kind| PARTS.map(|part| (kind, part))) {
+        let mut whole = fit;
+        whole.steps[kind] *= part;
+        let [own, other] = [fit, whole].map(|fit| coherence(&fit, points, &how)[kind]);
+        if whole.steps[kind] < MOST_STEP && other >= own {
+            fit = whole;
+        }
+    }
+    fit
 }
 
 /// The narrowest cut-off within which nearly all own points lie, steps: the fewer points of others,
@@ -170,20 +195,35 @@ fn judged(
         return None;
     }
     let cut = cut(&fit, all_round);
-    let how = CombComparison { cell: SHARED, cut: 1.2 * cut, uses: [true; 2] };
-    let own = on_raster(&fit, all_round, SHARED, cut);
-    let covariance = position_covariance(&fit, &own, &how)?;
+    let within = |cut: f64| {
+        let how = CombComparison { cell: SHARED, cut: 1.2 * cut, uses: [true; 2] };
+        (on_raster(&fit, all_round, SHARED, cut), how)
+    };
+    let (own, how) = within(cut);
+    let covariance = position_covariance(&fit, &own, &how).or_else(|| {
+        let (own, how) = within(NARROW);
+        position_covariance(&fit, &own, &how)
+    })?;
     let turn = floor.pose.rotation.to_rotation_matrix();
     let covariance = turn * covariance * turn.inverse();
     let n_cells = judged.n_cells;
     let sigma = [0, 1, 2].map(|i| covariance[(i, i)].max(0.0).sqrt() * UNMODELLED);
-    let share = judged.n_own / all_round.len().max(1) as f64;
-    let angle_sigmas = super::solve::compare(&fit, &own, &how).sigmas;
+    let angle_sigmas = deviations(&fit, &own, &how);
+    let owners::RasterPoints { raster, share, beside } =
+        owners::of_points(&fit, all_round, angle_sigmas);
     let clearness = judged.clearness;
-    let evidence =
-        RasterEvidence { floor_clearness, coherence, clearness, n_cells, share, angle_sigmas };
+    let evidence = RasterEvidence {
+        floor_clearness,
+        coherence,
+        clearness,
+        n_cells,
+        share,
+        beside,
+        angle_sigmas,
+    };
     let world_from_scanner = floor.pose * fit.pose;
-    Some(RasterSetup { world_from_scanner, sigma, steps: fit.steps, evidence })
+    let (raster, steps) = (Some(raster), fit.steps);
+    Some(RasterSetup { world_from_scanner, sigma, steps, raster, evidence })
 }
 
 fn is_within(fit: &RasterFit, p: &[f64; 3]) -> bool {

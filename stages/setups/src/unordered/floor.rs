@@ -78,8 +78,9 @@ impl FloorGrid {
 }
 
 impl FloorPoints {
-    /// The floor of a cloud; `None` where there are too few points of one.
-    pub(crate) fn find(points: &[[f32; 3]]) -> Option<Self> {
+    /// The floor of a cloud up to a distance from its middle; `None` where there are too few points
+    /// of one.
+    pub(crate) fn find(points: &[[f32; 3]], reach: f64) -> Option<Self> {
         let pose = frame(points)?;
         let local = pose.inverse().to_matrix().cast::<f32>();
         let mut own: Vec<[f32; 3]> = Vec::new();
@@ -94,7 +95,8 @@ impl FloorPoints {
                 own.push([along(0), along(1), height]);
             }
         }
-        own.retain(|p| p[0].hypot(p[1]) < REACH as f32);
+        let reach = reach.min(REACH) as f32;
+        own.retain(|p| p[0].abs() < reach && p[1].abs() < reach);
         if own.len() < FEWEST {
             return None;
         }

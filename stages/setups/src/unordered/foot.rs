@@ -35,7 +35,7 @@ pub(crate) fn place(points: &[[f64; 3]], about: [f64; 2], half: i32, step: f64) 
         let at = [about[0] + f64::from(i) * step, about[1] + f64::from(j) * step];
         for p in points {
             let (x, y) = (p[0] - at[0], p[1] - at[1]);
-            let r = x.hypot(y);
+            let r = (x * x + y * y).sqrt();
             if !(RING[0]..=RING[1]).contains(&r) {
                 continue;
             }

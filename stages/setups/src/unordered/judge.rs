@@ -13,16 +13,12 @@ pub const CLEAR: f64 = 67.0;
 const CELL: f64 = 0.105;
 /// Fewest points of a cell.
 const IN_CELL: f64 = 8.0;
-/// Half the width of a comb's teeth in which points count as on it, steps.
-const ON: f64 = 0.15;
 
 /// What the directions say of a scanner.
 pub(crate) struct RasterJudgement {
     /// Of azimuths and elevations.
     pub(crate) clearness: [f64; 2],
     pub(crate) n_cells: usize,
-    /// Number of points on both combs beyond chance.
-    pub(crate) n_own: f64,
 }
 
 /// Phasors of the points of a direction.
@@ -35,9 +31,6 @@ struct DirectionSum {
 /// Sectors of a turn that share a phase of azimuth each: a scan may end beside where it began.
 const SECTORS: usize = 4;
 
-/// A point's angles in steps, and its sector.
-type InSteps = ([f64; 2], usize);
-
 /// Sums of the phasors of directions: azimuths by sectors, elevations in the first.
 #[derive(Default)]
 struct CombSums {
@@ -48,7 +41,6 @@ struct CombSums {
 /// Compares the points with the combs of a fit.
 pub(crate) fn judge(fit: &RasterFit, points: &[[f64; 3]]) -> RasterJudgement {
     let mut cells: BTreeMap<(usize, i64, i64), DirectionSum> = BTreeMap::new();
-    let mut seen: Vec<InSteps> = Vec::new();
     for angles in points.iter().filter_map(|p| fit.see(p)).filter(SeenAngles::is_flat) {
         let (azimuth, elevation) = (angles.azimuth, angles.elevation);
         let sector = (((azimuth / TAU + 0.5) * SECTORS as f64) as usize).min(SECTORS - 1);
@@ -60,7 +52,6 @@ pub(crate) fn judge(fit: &RasterFit, points: &[[f64; 3]]) -> RasterJudgement {
             let (sin, cos) = (TAU * turn).sin_cos();
             *phasor = [phasor[0] + cos, phasor[1] + sin];
         }
-        seen.push((turns, sector));
     }
     cells.retain(|_, cell| cell.n >= IN_CELL);
     let mut sums = CombSums::default();
@@ -73,11 +64,7 @@ pub(crate) fn judge(fit: &RasterFit, points: &[[f64; 3]]) -> RasterJudgement {
         }
     }
     let clearness = [0, 1].map(|kind| sums.clearness(kind));
-    let n_on = seen.iter().filter(|point| sums.has(point)).count() as f64;
-    // Points of others lie on both combs with this probability.
-    let by_chance = (2.0 * ON).powi(2);
-    let n_own = ((n_on - by_chance * seen.len() as f64) / (1.0 - by_chance)).max(0.0);
-    RasterJudgement { clearness, n_cells: cells.len(), n_own }
+    RasterJudgement { clearness, n_cells: cells.len() }
 }
 
 impl CombSums {
@@ -86,14 +73,5 @@ impl CombSums {
         let all = self.phasors[kind].iter().zip(&self.power[kind]);
         let clear = all.filter(|(_, power)| **power > 0.0);
         clear.map(|(s, power)| (s[0] * s[0] + s[1] * s[1]) / power).fold(0.0, f64::max)
-    }
-
-    /// Whether a point lies on both combs.
-    fn has(&self, (turns, sector): &InSteps) -> bool {
-        [(0, *sector), (1, 0)].iter().all(|(kind, of)| {
-            let s = self.phasors[*kind][*of];
-            let off = turns[*kind] - s[1].atan2(s[0]) / TAU;
-            (off - off.round()).abs() < ON
-        })
     }
 }

@@ -11,6 +11,7 @@ mod chain;
 mod floor;
 mod foot;
 mod judge;
+mod owners;
 mod raster;
 mod solve;
 mod spectrum;
@@ -37,12 +38,17 @@ const EXPLAINED: f64 = 0.8;
 /// Number of points that are compared all round a candidate.
 const LOOKED: usize = 200_000;
 
-/// Finds the scanners that measured points in any order. The answer depends on the points and their
-/// order only, on no number of threads.
+/// Finds the scanners that measured points in any order. The votes for places are held in so many
+/// bytes, so that few of them leave the floor far from its middle out. The answer depends on the
+/// points, their order and this only, on no number of threads.
 #[must_use]
-pub fn find_unordered(points: &[[f32; 3]], fan: &dyn Fan) -> FoundRasters {
+pub fn find_unordered(points: &[[f32; 3]], bytes: usize, fan: &dyn Fan) -> FoundRasters {
     let none = |cause| FoundRasters { cause: Some(cause), ..FoundRasters::default() };
-    let Some(floor) = FloorPoints::find(points) else { return none(UnorderedCause::NoFloor) };
+    let cells = (bytes / votes::VOTE_BYTES) as f64;
+    let reach = 0.5 * votes::VOTE * cells.sqrt();
+    let Some(floor) = FloorPoints::find(points, reach) else {
+        return none(UnorderedCause::NoFloor);
+    };
     let waves = votes::waves(&floor, fan);
     let mut candidates = votes::candidates(&floor, &waves, LEAST_SCORE);
     candidates.truncate(MOST_CANDIDATES);
@@ -71,7 +77,8 @@ pub fn find_unordered(points: &[[f32; 3]], fan: &dyn Fan) -> FoundRasters {
     } else {
         (explained < EXPLAINED).then_some(UnorderedCause::Part)
     };
-    FoundRasters { setups, cause, explained }
+    owners::narrow(&mut setups, &floor.pose, &all_round);
+    FoundRasters { is_alone: owners::is_alone(&setups), setups, cause, explained }
 }
 
 /// Whether a candidate is the foot of a setup.

@@ -1,5 +1,6 @@
 //! What is found in points without order, and why nothing is.
 
+use contract::PointRaster;
 use geometry::Pose;
 
 /// A place where a scanner stood, found from points in no order.
@@ -13,6 +14,9 @@ pub struct RasterSetup {
     /// Azimuth between columns and elevation between rows, radians; either may be a part of the
     /// true step.
     pub steps: [f64; 2],
+    /// The raster that its points are told by; `None` where these scatter so much that as many of
+    /// others would pass for them.
+    pub raster: Option<PointRaster>,
     /// How clear it is.
     pub evidence: RasterEvidence,
 }
@@ -33,6 +37,8 @@ pub struct RasterEvidence {
     pub n_cells: usize,
     /// Share of the points that lie on both combs beyond those that chance puts there.
     pub share: f64,
+    /// Share of the points that lie beside both combs as those of others do.
+    pub beside: f64,
     /// Standard deviations of the angles about the combs, radians.
     pub angle_sigmas: [f64; 2],
 }
@@ -56,10 +62,25 @@ pub enum UnorderedCause {
 pub struct FoundRasters {
     /// The setups, those with more points first.
     pub setups: Vec<RasterSetup>,
+    /// Whether all points are those of the only setup.
+    pub is_alone: bool,
     /// Why there is none, or none for some points.
     pub cause: Option<UnorderedCause>,
     /// Share of the points that the setups explain.
     pub explained: f64,
+}
+
+impl FoundRasters {
+    /// About the share of the points that are surely those of a setup: they are on its raster and
+    /// beside those of all others.
+    #[must_use]
+    pub fn told(&self, setup: usize) -> f64 {
+        let Some(own) = self.setups.get(setup) else { return 0.0 };
+        let others = self.setups.iter().enumerate().filter(|(i, _)| *i != setup);
+        let rasters = others.filter_map(|(_, other)| other.raster.as_ref());
+        let beside = rasters.map(|raster| 1.0 - 4.0 * raster.apart[0] * raster.apart[1]);
+        own.evidence.share * beside.product::<f64>()
+    }
 }
 
 impl UnorderedCause {

@@ -1,7 +1,7 @@
 //! Least squares of place, axis and steps of a scanner on points in any order: azimuths and
 //! elevations lie on combs, of which the phases are free in each cell of direction.
 
-use geometry::robust::tukey;
+use geometry::robust::{tukey, tukey_slope};
 use geometry::{Pose, Vector};
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, UnitQuaternion};
 use rustc_hash::FxHashMap;
@@ -55,8 +55,8 @@ impl RasterFit {
     /// Angles of a point as the raster counts them.
     pub(crate) fn see(&self, at: &[f64; 3]) -> Option<SeenAngles> {
         let p = self.pose.rotation.inverse() * (Vector::from(*at) - self.pose.translation.vector);
-        let flat = p.x.hypot(p.y);
-        let range = p.norm();
+        let flat2 = p.x * p.x + p.y * p.y;
+        let (flat, range) = (flat2.sqrt(), (flat2 + p.z * p.z).sqrt());
         (flat > 1e-6).then(|| SeenAngles {
             azimuth: p.y.atan2(p.x),
             elevation: p.z.atan2(flat),
@@ -132,16 +132,30 @@ struct EquationMean {
     slope: Unknowns,
 }
 
-/// The raster compared with points.
-pub(crate) struct ComparedRaster {
+impl EquationMean {
+    fn add(&mut self, e: &AngleEquation, weight: f64) {
+        self.w += weight;
+        self.residual += weight * e.residual;
+        self.slope += e.slope * weight;
+    }
+}
+
+/// Points as a raster sees them, and how clear its combs are.
+pub(crate) struct SeenRaster {
+    rows: Vec<SeenPoint>,
+    sums: Vec<PhaseSum>,
     /// Power of the phasors above chance, over cells and kinds, in standard deviations.
-    pub(crate) score: f64,
+    score: f64,
     /// Length of the mean phasors of azimuth and elevation over all cells, weighted by points.
-    pub(crate) coherence: [f64; 2],
-    pub(crate) hessian: UnknownsSquare,
-    pub(crate) gradient: Unknowns,
+    coherence: [f64; 2],
+}
+
+/// The equations of least squares at a raster.
+struct RasterEquations {
+    hessian: UnknownsSquare,
+    gradient: Unknowns,
     /// Standard deviations of the residuals of what is within the cut-off, radians.
-    pub(crate) sigmas: [f64; 2],
+    sigmas: [f64; 2],
 }
 
 /// One point as it is compared.
@@ -150,32 +164,71 @@ struct SeenPoint {
     cell: u32,
 }
 
-fn cells(
-    fit: &RasterFit,
-    points: &[[f64; 3]],
-    how: &CombComparison,
-) -> (Vec<SeenPoint>, Vec<PhaseSum>) {
-    let mut of_key: FxHashMap<(i32, i32), u32> = FxHashMap::default();
-    let mut sums: Vec<PhaseSum> = Vec::new();
-    let mut rows = Vec::with_capacity(points.len());
-    for p in points {
-        let Some(angles) = fit.see(p).filter(SeenAngles::is_flat) else { continue };
-        let key = |v: f64, size: f64| if size.is_finite() { (v / size).floor() as i32 } else { 0 };
-        let key = (key(angles.azimuth, how.cell[0]), key(angles.elevation, how.cell[1]));
-        let cell = *of_key.entry(key).or_insert_with(|| {
-            sums.push(PhaseSum::default());
-            sums.len() as u32 - 1
-        });
-        let sum = &mut sums[cell as usize];
-        sum.n += 1.0;
-        for kind in 0..2 {
-            let (sin, cos) = (TAU * angles.angle(kind) / fit.steps[kind]).sin_cos();
-            sum.phasors[kind][0] += cos;
-            sum.phasors[kind][1] += sin;
+impl SeenRaster {
+    fn of(fit: &RasterFit, points: &[[f64; 3]], how: &CombComparison) -> Self {
+        let mut of_key: FxHashMap<(i32, i32), u32> = FxHashMap::default();
+        let mut sums: Vec<PhaseSum> = Vec::new();
+        let mut rows = Vec::with_capacity(points.len());
+        let per_step = fit.steps.map(|step| TAU / step);
+        for p in points {
+            let Some(angles) = fit.see(p).filter(SeenAngles::is_flat) else { continue };
+            let key = |v: f64, size: f64| (v / size).floor() as i32;
+            let key = (key(angles.azimuth, how.cell[0]), key(angles.elevation, how.cell[1]));
+            let cell = *of_key.entry(key).or_insert_with(|| {
+                sums.push(PhaseSum::default());
+                sums.len() as u32 - 1
+            });
+            let sum = &mut sums[cell as usize];
+            sum.n += 1.0;
+            for kind in (0..2).filter(|kind| how.uses[*kind]) {
+                let (sin, cos) = (angles.angle(kind) * per_step[kind]).sin_cos();
+                sum.phasors[kind][0] += cos;
+                sum.phasors[kind][1] += sin;
+            }
+            rows.push(SeenPoint { angles, cell });
         }
-        rows.push(SeenPoint { angles, cell });
+        let (mut score, mut coherence) = (0.0, [0.0; 2]);
+        let n_cells = sums.len().max(1) as f64;
+        for kind in (0..2).filter(|kind| how.uses[*kind]) {
+            let length = |s: &PhaseSum| s.phasors[kind][0].hypot(s.phasors[kind][1]);
+            let power = sums.iter().map(|s| length(s).powi(2) / s.n).sum::<f64>();
+            score += (power - n_cells) / n_cells.sqrt();
+            coherence[kind] = sums.iter().map(length).sum::<f64>() / rows.len().max(1) as f64;
+        }
+        Self { rows, sums, score, coherence }
     }
-    (rows, sums)
+
+    fn equations(&self, fit: &RasterFit, how: &CombComparison) -> RasterEquations {
+        let mut out = RasterEquations {
+            hessian: UnknownsSquare::zeros(),
+            gradient: Unknowns::zeros(),
+            sigmas: [0.0; 2],
+        };
+        for kind in (0..2).filter(|kind| how.uses[*kind]) {
+            let phases = CellPhases::of(kind, fit.steps[kind], &self.sums);
+            let mut means = vec![EquationMean::default(); self.sums.len()];
+            let (mut squares, mut total) = (0.0, 0.0);
+            for e in self.rows.iter().filter_map(|row| phases.equation(row, how.cut)) {
+                squares += e.cut * e.off * e.off;
+                total += e.cut;
+                means[e.cell].add(&e, e.weight);
+                out.hessian.syger(e.weight, &e.slope, &e.slope, 1.0);
+                out.gradient += e.slope * (e.weight * e.residual);
+            }
+            for mean in means.iter().filter(|m| m.w > 0.0) {
+                out.hessian.syger(-1.0 / mean.w, &mean.slope, &mean.slope, 1.0);
+                out.gradient -= mean.slope * (mean.residual / mean.w);
+            }
+            out.sigmas[kind] = (squares / f64::max(total, 1.0)).sqrt() * fit.steps[kind];
+        }
+        out.hessian.fill_upper_triangle_with_lower_triangle();
+        out
+    }
+}
+
+/// Standard deviations of the points about the combs of a raster, radians.
+pub(crate) fn deviations(fit: &RasterFit, points: &[[f64; 3]], how: &CombComparison) -> [f64; 2] {
+    SeenRaster::of(fit, points, how).equations(fit, how).sigmas
 }
 
 /// The raster of one kind of angle as its cells have it.
@@ -186,8 +239,6 @@ struct CellPhases {
     phase: Vec<f64>,
     /// Weight of each cell: how much its phasors exceed chance.
     trust: Vec<f64>,
-    length: f64,
-    power: f64,
 }
 
 /// One equation of a point.
@@ -212,8 +263,6 @@ impl CellPhases {
             step,
             phase: sums.iter().map(phase).collect(),
             trust: sums.iter().map(trust).collect(),
-            length: sums.iter().map(length).sum(),
-            power: sums.iter().map(|s| length(s).powi(2) / s.n).sum(),
         }
     }
 
@@ -242,63 +291,19 @@ impl CellPhases {
             weight: cut * known,
         })
     }
-
-    /// Weighted means of the equations of each cell, whose phase is free.
-    fn means(&self, rows: &[SeenPoint], cut: f64) -> Vec<EquationMean> {
-        let mut means = vec![EquationMean::default(); self.phase.len()];
-        for equation in rows.iter().filter_map(|row| self.equation(row, cut)) {
-            let mean = &mut means[equation.cell];
-            mean.w += equation.weight;
-            mean.residual += equation.weight * equation.residual;
-            mean.slope += equation.slope * equation.weight;
-        }
-        means
-    }
 }
 
-/// Compares a raster with points.
-pub(crate) fn compare(
-    fit: &RasterFit,
-    points: &[[f64; 3]],
-    how: &CombComparison,
-) -> ComparedRaster {
-    let (rows, sums) = cells(fit, points, how);
-    let mut out = ComparedRaster {
-        score: 0.0,
-        coherence: [0.0; 2],
-        hessian: UnknownsSquare::zeros(),
-        gradient: Unknowns::zeros(),
-        sigmas: [0.0; 2],
-    };
-    let n_cells = sums.len().max(1) as f64;
-    for kind in (0..2).filter(|kind| how.uses[*kind]) {
-        let phases = CellPhases::of(kind, fit.steps[kind], &sums);
-        out.score += (phases.power - n_cells) / n_cells.sqrt();
-        out.coherence[kind] = phases.length / rows.len().max(1) as f64;
-        let mut means = vec![EquationMean::default(); sums.len()];
-        let (mut squares, mut total) = (0.0, 0.0);
-        for e in rows.iter().filter_map(|row| phases.equation(row, how.cut)) {
-            squares += e.cut * e.off * e.off;
-            total += e.cut;
-            let mean = &mut means[e.cell];
-            mean.w += e.weight;
-            mean.residual += e.weight * e.residual;
-            mean.slope += e.slope * e.weight;
-            out.hessian.syger(e.weight, &e.slope, &e.slope, 1.0);
-            out.gradient += e.slope * (e.weight * e.residual);
-        }
-        for mean in means.iter().filter(|m| m.w > 0.0) {
-            out.hessian.syger(-1.0 / mean.w, &mean.slope, &mean.slope, 1.0);
-            out.gradient -= mean.slope * (mean.residual / mean.w);
-        }
-        out.sigmas[kind] = (squares / f64::max(total, 1.0)).sqrt() * fit.steps[kind];
-    }
-    out.hessian.fill_upper_triangle_with_lower_triangle();
-    out
+/// Length of the mean phasors of azimuth and elevation over all cells, weighted by points.
+pub(crate) fn coherence(fit: &RasterFit, points: &[[f64; 3]], how: &CombComparison) -> [f64; 2] {
+    SeenRaster::of(fit, points, how).coherence
 }
 
 /// Covariance of the position in the frame of the points, from how much the pulls of directions
 /// differ: points of one azimuth, and those of one elevation, share errors of the encoders.
+///
+/// How far a pull moves the position depends on the slope of the pulls there and not on the weights
+/// of the points: near the cut-off a point that comes closer pulls more, not less, and points of
+/// others, which lie evenly beside the combs, hold nothing back.
 pub(crate) fn position_covariance(
     fit: &RasterFit,
     points: &[[f64; 3]],
@@ -306,23 +311,34 @@ pub(crate) fn position_covariance(
 ) -> Option<Matrix3<f64>> {
     /// Size of the bins of angle in which errors are taken for one, radians (5°).
     const BIN: f64 = 0.087;
-    let inverse = compare(fit, points, how).hessian.try_inverse()?;
-    let (rows, sums) = cells(fit, points, how);
+    let SeenRaster { rows, sums, .. } = SeenRaster::of(fit, points, how);
+    let mut hessian = UnknownsSquare::zeros();
     let mut pulls = [BTreeMap::<(usize, i64), Unknowns>::new(), BTreeMap::new()];
     for kind in 0..2 {
         let phases = CellPhases::of(kind, fit.steps[kind], &sums);
-        let means = phases.means(&rows, how.cut);
-        for row in &rows {
-            let Some(e) = phases.equation(row, how.cut) else { continue };
+        let equations =
+            || rows.iter().filter_map(|row| Some((row, phases.equation(row, how.cut)?)));
+        let mut means = vec![EquationMean::default(); sums.len()];
+        for (_, e) in equations() {
+            let held = e.weight * tukey_slope(e.off, how.cut) / e.cut;
+            means[e.cell].add(&e, held);
+            hessian.syger(held, &e.slope, &e.slope, 1.0);
+        }
+        for mean in means.iter().filter(|m| m.w > 0.0) {
+            hessian.syger(-1.0 / mean.w, &mean.slope, &mean.slope, 1.0);
+        }
+        for (row, e) in equations().filter(|(_, e)| means[e.cell].w > 0.0) {
             let mean = &means[e.cell];
-            let off = e.residual - mean.residual / mean.w;
-            let pull = (e.slope - mean.slope / mean.w) * (e.weight * off);
+            let pull = (e.slope - mean.slope / mean.w) * (e.weight * e.residual);
             for (by, pulls) in pulls.iter_mut().enumerate() {
                 let bin = (row.angles.angle(by) / BIN).floor() as i64;
                 *pulls.entry((kind, bin)).or_insert_with(Unknowns::zeros) += pull;
             }
         }
     }
+    hessian.fill_upper_triangle_with_lower_triangle();
+    // Where it is not positive, the combs are no clearer here than beside.
+    let inverse = hessian.cholesky()?.inverse();
     let turn = fit.pose.rotation.to_rotation_matrix();
     let of = |pulls: &BTreeMap<(usize, i64), Unknowns>| {
         let n = pulls.len() as f64;
@@ -336,40 +352,40 @@ pub(crate) fn position_covariance(
 }
 
 /// The fit by steps of least squares along some directions of the unknowns, for as long as the
-/// combs become clearer; and how it compares.
+/// combs become clearer; and the coherence of azimuths and elevations then.
 pub(crate) fn improved(
-    fit: RasterFit,
+    mut fit: RasterFit,
     points: &[[f64; 3]],
     how: &CombComparison,
     along: impl Fn(&RasterFit) -> Vec<Unknowns>,
     rounds: usize,
-) -> (RasterFit, ComparedRaster) {
-    let mut best = (fit, compare(&fit, points, how));
+) -> (RasterFit, [f64; 2]) {
+    let mut seen = SeenRaster::of(&fit, points, how);
     for _ in 0..rounds {
-        let Some(by) = step(&best.1, &along(&best.0)) else { break };
+        let Some(by) = step(&seen.equations(&fit, how), &along(&fit)) else { break };
         let tried = [1.0, 0.5, 0.25].into_iter().find_map(|scale| {
-            let moved = best.0.moved(&(by * scale));
-            let compared = compare(&moved, points, how);
-            (compared.score > best.1.score).then_some((moved, compared))
+            let moved = fit.moved(&(by * scale));
+            let other = SeenRaster::of(&moved, points, how);
+            (other.score > seen.score).then_some((moved, other))
         });
-        let Some(next) = tried else { break };
-        let gain = next.1.score - best.1.score;
-        best = next;
-        if gain < ENOUGH * best.1.score.abs() {
+        let Some((moved, other)) = tried else { break };
+        let gain = other.score - seen.score;
+        (fit, seen) = (moved, other);
+        if gain < ENOUGH * seen.score.abs() {
             break;
         }
     }
-    best
+    (fit, seen.coherence)
 }
 
 /// The step of least squares along some directions of the unknowns; `None` where they leave
 /// something undetermined.
-fn step(compared: &ComparedRaster, along: &[Unknowns]) -> Option<Unknowns> {
+fn step(equations: &RasterEquations, along: &[Unknowns]) -> Option<Unknowns> {
     let columns: Vec<DVector<f64>> =
         along.iter().map(|u| DVector::from_column_slice(u.as_slice())).collect();
     let basis = DMatrix::from_columns(&columns);
-    let h = DMatrix::from_column_slice(7, 7, compared.hessian.as_slice());
-    let g = DVector::from_column_slice(compared.gradient.as_slice());
+    let h = DMatrix::from_column_slice(7, 7, equations.hessian.as_slice());
+    let g = DVector::from_column_slice(equations.gradient.as_slice());
     let h = basis.transpose() * h * &basis;
     let by = &basis * h.cholesky()?.solve(&-(basis.transpose() * g));
     Some(Unknowns::from_column_slice(by.as_slice()))

@@ -25,6 +25,8 @@ const DISTANCES: [f64; 2] = [0.5, 6.0];
 const FAN_ANGLE: f64 = 0.09;
 /// Cell of the votes, metres.
 pub(crate) const VOTE: f64 = 0.02;
+/// Memory of a cell of the votes, bytes: the votes of this place, and those about it.
+pub(crate) const VOTE_BYTES: usize = 8;
 
 /// A wave of the density of points on the floor.
 #[derive(Debug, Clone, Copy)]
@@ -207,10 +209,11 @@ pub(crate) fn candidates(floor: &FloorPoints, waves: &[FloorWave], least: f64) -
     for wave in waves {
         vote(&grid, &mut votes, wave);
     }
-    let near = blurred(&votes, grid.n, 1, 2);
-    let about = blurred(&votes, grid.n, 15, 3);
-    let score: Vec<f32> =
-        near.iter().zip(&about).map(|(v, b)| (v - b) / (b + 1.0).sqrt()).collect();
+    let mut score = votes.clone();
+    blur(&mut score, grid.n, 1, 2);
+    blur(&mut votes, grid.n, 15, 3);
+    score.iter_mut().zip(&votes).for_each(|(v, b)| *v = (*v - b) / (b + 1.0).sqrt());
+    drop(votes);
     let mut out = maxima(&score, &grid, least);
     out.sort_by(|a, b| b.score.total_cmp(&a.score));
     out
@@ -237,9 +240,8 @@ fn vote(grid: &FloorGrid, votes: &mut [f32], wave: &FloorWave) {
     }
 }
 
-/// Means over squares of `2 half + 1` cells, `times` times.
-fn blurred(values: &[f32], n: [usize; 2], half: usize, times: usize) -> Vec<f32> {
-    let mut out = values.to_vec();
+/// Takes means over squares of `2 half + 1` cells, `times` times.
+fn blur(out: &mut [f32], n: [usize; 2], half: usize, times: usize) {
     let mut line = Vec::new();
     for _ in 0..times {
         for axis in 0..2 {
@@ -258,7 +260,6 @@ fn blurred(values: &[f32], n: [usize; 2], half: usize, times: usize) -> Vec<f32>
             }
         }
     }
-    out
 }
 
 fn maxima(score: &[f32], grid: &FloorGrid, least: f64) -> Vec<FootVote> {

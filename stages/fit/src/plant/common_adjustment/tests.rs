@@ -55,6 +55,7 @@ fn a_scan_that_walls_see_off_moves_the_robot_that_it_alone_sees() {
         name: String::new(),
         source_id: None,
         places: Vec::new(),
+        raster: None,
         scanner: contract::ScannerPosition::Stated,
         world_from_scan: Pose::translation(x, 0.0, 1.5),
         lattice: None,
