@@ -41,8 +41,9 @@ const N_STRETCHES: usize = 6;
 /// Largest number of stretches for each one with points: a curtain of few points has lines with
 /// larger gaps.
 const MAX_SPACING: usize = 3;
-/// Distance from a long line within which most points are to lie on it, metres.
-const BESIDE_LINE: f32 = 0.06;
+/// Distance from a long line within which most points are to lie on it, metres: less than that of
+/// the wires of a fence, which is 50 mm.
+const BESIDE_LINE: f32 = 0.04;
 /// Number of directions, of the nearest points, in which a long line is looked for.
 const N_DIRECTIONS: usize = 24;
 
