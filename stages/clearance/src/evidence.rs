@@ -94,14 +94,18 @@ pub(crate) fn evident(
     }
     let surfaces = Grid::of(NEAR, all, |o| !o.is_grazed);
     let points = Grid::of(NEAR, all, Obstacle::is_point);
-    let is_undoubted = |(at, _): (usize, Offset)| {
-        !doubtful[at] && (all[at].is_point() || all[at].what == ObstacleKind::Floor)
-    };
+    let is_undoubted =
+        |at: usize| !doubtful[at] && (all[at].is_point() || all[at].what == ObstacleKind::Floor);
     let look = PointEvidence { sight, seen, surface_threshold, surfaces, points };
     each(fan, all, |at, o| {
+        let undoubted = |reach: f32| {
+            let near = look.surfaces.offsets(at, o.at, reach);
+            near.filter(|(other, _)| is_undoubted(*other)).map(|(_, by)| by)
+        };
         !doubtful[at]
-            || look.surfaces.offsets(at, o.at, BESIDE).any(is_undoubted)
+            || undoubted(BESIDE).next().is_some()
             || look.is_evident(at, o)
+            || lines::is_in_plane_of(&undoubted(LINE_REACH).collect::<Vec<_>>())
     })
 }
 

@@ -134,6 +134,20 @@ fn uncertain_points_of_grazing_beams_count_only_on_surfaces_of_others() {
     assert_eq!(grazed_among(&at_wall, SpaceKind::Free), [true; 2]);
 }
 
+#[test]
+fn a_point_among_the_wires_of_a_fence_stays() {
+    let obstacle = |at, what, is_grazed| Obstacle { at, radius: 0.0035, what, is_grazed };
+    let grazed = |at| obstacle(at, ObstacleKind::Uncertain, true);
+    // Few points of wires, in a plane along the beams; one that sticks out of it, and one beyond.
+    let mut all = vec![grazed([0.0; 3]), grazed([0.0, 0.03, 0.0]), grazed([0.0, 0.0, 0.16])];
+    let wires = (0..12).map(|i| (0.05 * (i % 4) as f32 - 0.075, 0.08 * (i / 4) as f32 - 0.08));
+    all.extend(wires.map(|(x, z)| obstacle([x, 0.0, z], ObstacleKind::Fixed, false)));
+    all.extend(wall().map(|p| obstacle(p, ObstacleKind::Fixed, false)));
+    let space = space_of(SpaceKind::Free);
+    let seen = SeenSpace { space: &space, world_from_base: &Pose::identity() };
+    assert_eq!(evident(&mut all, &OneEye, Some(seen), &OneByOne)[..3], [true, false, false]);
+}
+
 /// Scanners at [`EYE`] and at its side, with beams that are 4 mm apart at the origin.
 const SIDE: [f64; 3] = [0.0, -2.0, 0.0];
 const STEP: f64 = 0.002;
