@@ -207,7 +207,7 @@ def cell(args, k, figures):
     truth = true_points(dir / "noisy", dir / "exact", out)
     found = [r["model"] for r in json.load(open(out / "result.json"))["robots"]]
     grids = list(spaces(str(out)))
-    for budget in ([], ["--triangles", TRIANGLES]):
+    for budget in [[]] + ([["--triangles", TRIANGLES]] if args.budget else []):
         call = [args.program, "export", out, "--to", "mesh", "--mesh-format", "ply", *budget]
         cpu, wall, peak = child([*call, *quiet])
         report = json.load(open(out / "export/mesh/mesh.json"))
@@ -236,6 +236,7 @@ def main():
     parser.add_argument("--cells", type=int, default=10)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--csv", type=argparse.FileType("w"), default=sys.stdout)
+    parser.add_argument("--no-budget", dest="budget", action="store_false", help="the default bound only")
     parser.add_argument("--keep", action="store_true", help="keep scans and results")
     args = parser.parse_args()
     args.program, args.work = args.program.resolve(), args.work.resolve()

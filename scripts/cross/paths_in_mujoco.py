@@ -17,8 +17,8 @@ cause is one of these, or the path is a fault:
               keep out of all pieces
     margin    the link enters a piece, but is farther than the margin of `check` from all points:
               the piece stands out from the points by that much
-    grazed    `check` calls it blocked, and the piece is as near to the link as what it adds to the
-              distance (half a step, the ball of a cell) and the bound of the mesh allow
+    grazed    `check` calls it blocked, and in the posture that it names the link's own triangles are
+              as near to a fixed point as what it adds to the distance: half a step, the ball of a cell
     as found  `check` lists the link as no nearer than as found: most points beside a link are its
               own and move with it, and the mesh has them as fixed
     touching  all links that hit something touch a piece as found, and pairs that do are left out
@@ -59,6 +59,8 @@ DEEPER = 0.001
 SPACING = 0.003
 # LAS classes of points of robots and of what hangs on them.
 MOVING = (65, 66)
+# Those of the floor and of what is known to stand still.
+STANDING = (2, 64)
 
 
 def call(*args, codes=(0,)):
@@ -186,6 +188,24 @@ class Plant:
         off, at = points[0].query(place)
         return float(off), from_mesh, int(points[1][at])
 
+    def from_points(self, said, at, start, goal, own, points):
+        """The least distance of a link's own triangles from fixed points and the floor, in the
+        postures in which `check` names a hit of that link."""
+        least = None
+        for contact in hits(said)[1]:
+            self.qpos = self.start.copy()
+            self.qpos[at] = start + contact["worst"] * (goal - start)
+            self.follow(own, set(at))
+            self.data.qpos[:] = self.qpos
+            mujoco.mj_kinematics(self.model, self.data)
+            for geom, link in enumerate(self.links):
+                if link != self.robot + contact["link"] or self.model.geom_dataid[geom] < 0:
+                    continue
+                turn, to = self.data.geom_xmat[geom].reshape(3, 3), self.data.geom_xpos[geom]
+                off = points[2].query(self.surface(geom) @ turn.T + to, distance_upper_bound=0.1)[0]
+                least = float(off.min()) if least is None else min(least, float(off.min()))
+        return least
+
     def follow(self, own, driven):
         """Moves followers of one robot, and joints of its loops until their pins meet."""
         model, qpos = self.model, self.qpos
@@ -257,7 +277,13 @@ class Plant:
         return nearest, links, gaped
 
 
-def cause(said, nearest, links, touching, bound):
+def hits(said):
+    """Contacts for which `check` calls a path blocked, with what is known to stand still."""
+    deep = [c for c in said["contacts"] if c["level"] in ("hit", "inside") and not c["as_found"]]
+    return deep, [c for c in deep if c["what"] in ("fixed", "floor")]
+
+
+def cause(said, nearest, links, touching, from_points):
     """Why a path differs; empty where it does not."""
     depth, own = nearest["depth"], links["depth"]
     if (said["outcome"] == "blocked") == (depth > 0):
@@ -268,12 +294,12 @@ def cause(said, nearest, links, touching, bound):
         if any(c["link"] == links["link"] and c["as_found"] for c in said["contacts"]):
             return "as found"
         return "margin" if links["from"] and links["from"][0] >= MARGIN else "fault"
-    hits = [c for c in said["contacts"] if c["level"] in ("hit", "inside") and not c["as_found"]]
-    if all(c["what"] not in ("fixed", "floor") for c in hits):
+    _, standing = hits(said)
+    if not standing:
         return "beside"
-    if all(c["link"] in touching for c in hits if c["what"] in ("fixed", "floor")):
+    if all(c["link"] in touching for c in standing):
         return "touching"
-    return "grazed" if own > -(ADDED + bound) else "fault"
+    return "grazed" if from_points is not None and from_points < ADDED + SPACING else "fault"
 
 
 def goals(plant, robot, names, draw, n):
@@ -317,7 +343,10 @@ def paths(args, out, robot, wanted, draw, points, figures):
         taken += able[: -(-wanted // 2)]
     for k in sorted(taken):
         nearest, links, gaped = plant.run(at, start, drawn[k], own, points)
-        hits = [c for c in said[k]["contacts"] if c["level"] in ("hit", "inside") and not c["as_found"]]
+        differs = (said[k]["outcome"] == "blocked") != (nearest["depth"] > 0)
+        from_points = None
+        if differs and said[k]["outcome"] == "blocked":
+            from_points = plant.from_points(said[k], at, start, drawn[k], own, points)
         mm = lambda v: f"< {-LOOKED * 1e3:.0f}" if v <= -LOOKED else round(v * 1e3, 1)
         row = {
             "plant": out.name if out.name not in ("result", "out") else out.parent.name,
@@ -330,8 +359,9 @@ def paths(args, out, robot, wanted, draw, points, figures):
             "there_from_points_mm": mm(links["from"][0]) if links["from"] else "",
             "there_from_mesh_mm": mm(links["from"][1]) if links["from"] else "",
             "there_class": links["from"][2] if links["from"] else "",
-            "check_hits": "; ".join(sorted({f"{c['link']} {c['what']}" for c in hits}))[:120],
-            "differs": cause(said[k], nearest, links, touching, args.bound),
+            "check_hits": "; ".join(sorted({f"{c['link']} {c['what']}" for c in hits(said[k])[0]}))[:120],
+            "hit_from_points_mm": mm(from_points) if from_points is not None else "",
+            "differs": cause(said[k], nearest, links, touching, from_points),
             "pins_gape_mm": round(gaped * 1e3, 4),
         }  # fmt: skip
         figures.add(row)
@@ -361,7 +391,7 @@ def main():
             tiles = [read_las(path) for path in sorted((out / "tiles").glob("*.las"))]
             stands = [~np.isin(kinds, MOVING) for _, kinds in tiles]
             xyz, kinds = (np.concatenate([t[i][own] for t, own in zip(tiles, stands)]) for i in (0, 1))
-            points = cKDTree(xyz), kinds
+            points = cKDTree(xyz), kinds, cKDTree(xyz[np.isin(kinds, STANDING)])
         paths(args, out, robot, -(-args.paths // len(robots)), draw, points, figures)
 
 

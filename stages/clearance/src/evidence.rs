@@ -3,11 +3,12 @@
 //! Scans have stray points: a beam that hits an edge partly gives a point between the edge and the
 //! surface behind it, where nothing is, and masks leave some points of a robot to the fixed world.
 //! A point that is labelled as fixed is dropped only with proof that nothing is there: beams of
-//! another scanner passed its place, and neither a surface, nor a line, a bar or a plane, nor a
-//! point of another scanner goes with it. Beams also pass beside a thing that is thinner than their
-//! distance, so that the proof alone would drop wires and pipes. An uncertain point is dropped
-//! without such proof, too, if it lies alone in space that beams passed through, or if its beam
-//! grazed an edge in front of it and it belongs to nothing either.
+//! another scanner passed its place, its own beam passed an edge in front of it, and neither a
+//! surface, nor a line, a bar or a plane, nor a point of another scanner goes with it. Beams also
+//! pass beside a thing that is thinner than their distance, so that the first alone would drop wires
+//! and pipes. An uncertain point is dropped without such proof, too, if it lies alone in space that
+//! beams passed through, or if its beam grazed an edge in front of it and it belongs to nothing
+//! either. Whatever lies right beside an undoubted point stays.
 
 use crate::grid::Grid;
 use crate::lines::{self, Offset};
@@ -35,6 +36,9 @@ const LINE_REACH: f32 = 0.15;
 /// Distance within which points of two scanners lie on one surface, metres: two edges leave stray
 /// points at one place by chance only.
 const AGREED: f32 = 0.04;
+/// Distance from an undoubted point within which others belong to the same thing, metres: it would
+/// be in the way of a path within the usual margin just the same.
+const BESIDE: f32 = 0.02;
 /// Largest number of unknown voxels among the six beside that of a point for its surroundings to
 /// count as seen.
 const UNKNOWN: usize = 2;
@@ -76,19 +80,32 @@ pub(crate) fn evident(
         o.is_point() && (o.is_grazed || surfaces.n_near(at, o.at, NEAR, SOLID) < SOLID)
     });
     let passed = each(fan, all, |at, o| o.is_point() && sight.is_passed(at, o));
-    let is_asked =
-        |(o, thin): (&Obstacle, &bool)| *thin && o.what == ObstacleKind::Uncertain && !o.is_grazed;
-    let asked: Vec<bool> = all.iter().zip(&thin).map(is_asked).collect();
+    let asked = each(fan, all, |at, o| match o.what {
+        ObstacleKind::Uncertain => thin[at] && !o.is_grazed,
+        _ => passed[at],
+    });
     let behind = sight.behind(all, &asked);
+    let doubtful = each(fan, all, |at, o| match o.what {
+        ObstacleKind::Uncertain => passed[at] || thin[at],
+        _ => passed[at] && behind[at],
+    });
     for (at, o) in all.iter_mut().enumerate() {
-        o.is_grazed |= behind[at] || passed[at];
+        o.is_grazed |= behind[at] || passed[at] && doubtful[at];
     }
-    let (surfaces, points) =
-        (Grid::of(NEAR, all, |o| !o.is_grazed), Grid::of(NEAR, all, Obstacle::is_point));
+    let surfaces = Grid::of(NEAR, all, |o| !o.is_grazed);
+    let points = Grid::of(NEAR, all, Obstacle::is_point);
+    let is_undoubted =
+        |at: usize| !doubtful[at] && (all[at].is_point() || all[at].what == ObstacleKind::Floor);
     let look = PointEvidence { sight, seen, surface_threshold, surfaces, points };
     each(fan, all, |at, o| {
-        let is_doubtful = passed[at] || thin[at] && o.what != ObstacleKind::Fixed;
-        !is_doubtful || look.is_evident(at, o)
+        let undoubted = |reach: f32| {
+            let near = look.surfaces.offsets(at, o.at, reach);
+            near.filter(|(other, _)| is_undoubted(*other)).map(|(_, by)| by)
+        };
+        !doubtful[at]
+            || undoubted(BESIDE).next().is_some()
+            || look.is_evident(at, o)
+            || lines::is_in_plane_of(&undoubted(LINE_REACH).collect::<Vec<_>>())
     })
 }
 

@@ -41,8 +41,9 @@ const N_STRETCHES: usize = 6;
 /// Largest number of stretches for each one with points: a curtain of few points has lines with
 /// larger gaps.
 const MAX_SPACING: usize = 3;
-/// Distance from a long line within which most points are to lie on it, metres.
-const BESIDE_LINE: f32 = 0.06;
+/// Distance from a long line within which most points are to lie on it, metres: less than that of
+/// the wires of a fence, which is 50 mm.
+const BESIDE_LINE: f32 = 0.04;
 /// Number of directions, of the nearest points, in which a long line is looked for.
 const N_DIRECTIONS: usize = 24;
 
@@ -118,6 +119,35 @@ fn is_on_plane_within(reach: f32, near: &[Offset], here: &Point, eyes: &[Point])
     is_wide.all(|k| eigen.eigenvalues[k] > PLANE_WIDTH * PLANE_WIDTH)
         && near.iter().filter(|v| v.dot(&normal).abs() < LINE_THICKNESS).count() >= most
         && eyes.iter().all(is_faced)
+}
+
+/// Whether the origin lies in the plane of these points, which are sure, and among them: as a wire
+/// of a fence does, where other wires beside it were met better.
+pub(crate) fn is_in_plane_of(sure: &[Offset]) -> bool {
+    if sure.len() < ON_CLEAR_LINE {
+        return false;
+    }
+    let n = sure.len() as f32;
+    let middle: Offset = sure.iter().sum::<Offset>() / n;
+    let spread: nalgebra::Matrix3<f32> =
+        sure.iter().map(|v| (v - middle) * (v - middle).transpose()).sum();
+    let eigen = (spread / n).symmetric_eigen();
+    let across = eigen.eigenvalues.imin();
+    let [normal, u, v]: [Offset; 3] = std::array::from_fn(|k| {
+        let axis = (across + k) % 3;
+        eigen.eigenvectors.column(axis).into_owned()
+    });
+    let is_flat = |w: &&Offset| (*w - middle).dot(&normal).abs() < LINE_THICKNESS;
+    let mut is_wide = (0..3).filter(|k| *k != across);
+    let quarter = |w: &Offset| usize::from(w.dot(&u) > 0.0) + 2 * usize::from(w.dot(&v) > 0.0);
+    let quarters = sure.iter().fold([false; 4], |mut has, w| {
+        has[quarter(w)] = true;
+        has
+    });
+    middle.dot(&normal).abs() < LINE_THICKNESS
+        && is_wide.all(|k| eigen.eigenvalues[k] > PLANE_WIDTH * PLANE_WIDTH)
+        && quarters == [true; 4]
+        && sure.iter().filter(is_flat).count() as f64 >= CLEAR_SHARE * f64::from(n)
 }
 
 /// Whether most points near the origin, which is at `here`, lie on one bar with it, such as a pipe,

@@ -134,6 +134,20 @@ fn uncertain_points_of_grazing_beams_count_only_on_surfaces_of_others() {
     assert_eq!(grazed_among(&at_wall, SpaceKind::Free), [true; 2]);
 }
 
+#[test]
+fn a_point_among_the_wires_of_a_fence_stays() {
+    let obstacle = |at, what, is_grazed| Obstacle { at, radius: 0.0035, what, is_grazed };
+    let grazed = |at| obstacle(at, ObstacleKind::Uncertain, true);
+    // Few points of wires, in a plane along the beams; one that sticks out of it, and one beyond.
+    let mut all = vec![grazed([0.0; 3]), grazed([0.0, 0.03, 0.0]), grazed([0.0, 0.0, 0.16])];
+    let wires = (0..12).map(|i| (0.05 * (i % 4) as f32 - 0.075, 0.08 * (i / 4) as f32 - 0.08));
+    all.extend(wires.map(|(x, z)| obstacle([x, 0.0, z], ObstacleKind::Fixed, false)));
+    all.extend(wall().map(|p| obstacle(p, ObstacleKind::Fixed, false)));
+    let space = space_of(SpaceKind::Free);
+    let seen = SeenSpace { space: &space, world_from_base: &Pose::identity() };
+    assert_eq!(evident(&mut all, &OneEye, Some(seen), &OneByOne)[..3], [true, false, false]);
+}
+
 /// Scanners at [`EYE`] and at its side, with beams that are 4 mm apart at the origin.
 const SIDE: [f64; 3] = [0.0, -2.0, 0.0];
 const STEP: f64 = 0.002;
@@ -175,12 +189,46 @@ fn curtain() -> Vec<([f64; 3], u16)> {
     (0..20).map(|i| ([depth(i), 0.0, 0.02 * f64::from(i) - 0.2], 1)).collect()
 }
 
+/// That edge: a post that the scanner at [`EYE`] has beside all beams of a curtain.
+fn post() -> impl Iterator<Item = ([f64; 3], u16)> {
+    (0..150).map(|i| ([-0.5, 0.003, 0.003 * f64::from(i) - 0.225], 1))
+}
+
 #[test]
 fn a_fixed_point_is_dropped_only_where_beams_of_another_scanner_passed() {
-    let curtain = curtain();
-    assert_eq!(fixed_among(&curtain, |_| false), [false; 20]);
+    let curtain: Vec<_> = curtain().into_iter().chain(post()).collect();
+    assert_eq!(fixed_among(&curtain, |_| false)[..20], [false; 20]);
     // The scanner at the side had no beam there.
-    assert_eq!(fixed_among(&curtain, |_| true), [true; 20]);
+    assert_eq!(fixed_among(&curtain, |_| true)[..20], [true; 20]);
+}
+
+#[test]
+fn a_fixed_point_stays_where_its_own_beam_passed_no_edge() {
+    // Beams from the side are too far apart to meet these pins.
+    let pins: Vec<_> = (0..8).map(|i| ([0.0, 0.0, 0.08 * f64::from(i) - 0.28], 1)).collect();
+    assert_eq!(fixed_among(&pins, |_| false), [true; 8]);
+}
+
+#[test]
+fn the_wires_of_a_fence_that_is_seen_along_stay() {
+    // Upright wires 50 mm apart, at 11° to the beams, so that each has others in front of it.
+    let of = |i: i32| {
+        let along = f64::from(i % 5) * 0.05 - 0.1;
+        ([along, 0.2 * along, f64::from(i / 5) * 0.012 - 0.2], 1)
+    };
+    let fence: Vec<_> = (0..170).map(of).collect();
+    assert_eq!(fixed_among(&fence, |_| false), [true; 170]);
+}
+
+#[test]
+fn what_lies_right_beside_an_undoubted_point_stays() {
+    let obstacle = |at, what, is_grazed| Obstacle { at, radius: 0.0035, what, is_grazed };
+    let grazed = |x| obstacle([x, 0.0, 0.0], ObstacleKind::Uncertain, true);
+    let mut all = vec![obstacle([0.0; 3], ObstacleKind::Fixed, false), grazed(0.017), grazed(0.03)];
+    all.extend(wall().map(|p| obstacle(p, ObstacleKind::Fixed, false)));
+    let space = space_of(SpaceKind::Free);
+    let seen = SeenSpace { space: &space, world_from_base: &Pose::identity() };
+    assert_eq!(evident(&mut all, &OneEye, Some(seen), &OneByOne)[..3], [true, true, false]);
 }
 
 #[test]
@@ -207,8 +255,9 @@ fn a_pipe_that_another_scanner_sees_past_stays() {
     // A curtain that dense behind an edge is as deep as what the edge hides.
     let behind =
         |i: i32| ([f64::from(i * i * 37 % 53) * 0.002, 0.002, 0.002 * f64::from(i % 60)], 1);
-    let curtain: Vec<_> = (0..240).map(behind).collect();
-    let n_kept = fixed_among(&curtain, |_| false).iter().filter(|is| **is).count();
+    let curtain: Vec<_> = (0..240).map(behind).chain(post()).collect();
+    let kept = fixed_among(&curtain, |_| false);
+    let n_kept = kept[..240].iter().filter(|is| **is).count();
     assert!(n_kept < 24, "{n_kept}");
 }
 
