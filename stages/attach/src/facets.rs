@@ -4,7 +4,7 @@
 use contract::{RESIDUAL_EDGE, ResidualVoxel};
 use geometry::Vector;
 
-/// Least length of the mean of unit normals in a voxel: less has no direction.
+/// Least length of the sum of unit normals in a voxel: less has no direction.
 const CLEAR: f64 = 0.5;
 /// Sine of the angle by which the surface turns inward between two voxels from which on they meet
 /// in an inner corner (20°).

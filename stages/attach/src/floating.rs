@@ -22,6 +22,11 @@ const MIN_VOXELS: usize = 8;
 const WIRE: f64 = 2.9;
 const WIRE_RATIO: f64 = 5.0;
 
+/// How far a column of beams may reach beyond the rest of its body, voxels (8 cm, as far as columns
+/// are apart), and how many times more voxels the body has at least.
+const IN_BOUNDS: i32 = 4;
+const LARGER: usize = 20;
+
 /// The residual voxels of a plant as bodies.
 pub(crate) struct Bodies<'a> {
     /// Largest distance of a body from a hand or from what the hand carries, metres.
@@ -43,13 +48,15 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
     for voxel in bodies.links.iter().filter(|v| (bodies.is_hand)(v.nearest)) {
         hands.add(voxel.voxel, mark(voxel.nearest));
     }
-    let mut bits: Vec<&[usize]> = Vec::new();
+    let (mut bits, mut lines): (Vec<&[usize]>, Vec<&[usize]>) = (Vec::new(), Vec::new());
     for members in bodies.components {
         let is_free = members
             .iter()
             .all(|&at| decided.labels[at].is_none() && !(bodies.is_fixed)(&bodies.voxels[at]));
-        if is_free && !is_wire(bodies, members) {
-            if members.len() >= MIN_BIT {
+        if is_free {
+            if is_wire(bodies, members) {
+                lines.push(members);
+            } else if members.len() >= MIN_BIT {
                 bits.push(members);
             }
             continue;
@@ -69,6 +76,9 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
     }
     let mut open = joined(bodies, &bits);
     open.retain(|members| members.len() >= MIN_VOXELS);
+    for &at in join_columns(bodies, &mut open, lines).iter().copied().flatten() {
+        fixed.add(bodies.voxels[at].voxel, 0);
+    }
     while let Some((which, mark)) = nearest(bodies, &open, &hands, &fixed) {
         let members = open.remove(which);
         let mut group = Group {
@@ -95,6 +105,40 @@ fn is_wire(bodies: &Bodies<'_>, members: &[usize]) -> bool {
     let voxels: Vec<Voxel> = members.iter().map(|at| bodies.voxels[*at].voxel).collect();
     let spread = spreads_of(&voxels, bodies.voxels[*first].voxel);
     spread[2] >= WIRE && is_line(&spread, bodies.thin, WIRE_RATIO)
+}
+
+/// Gives the columns of beams among some lines to their bodies, one beside the other, and returns
+/// the other lines.
+fn join_columns<'a>(
+    bodies: &Bodies<'_>,
+    open: &mut [Vec<usize>],
+    mut lines: Vec<&'a [usize]>,
+) -> Vec<&'a [usize]> {
+    loop {
+        let n_before = lines.len();
+        lines.retain(|line| {
+            let body = open.iter_mut().find(|body| is_column_of(bodies, line, body));
+            let is_wire = body.is_none();
+            body.into_iter().for_each(|body| body.extend_from_slice(line));
+            is_wire
+        });
+        if lines.len() == n_before {
+            return lines;
+        }
+    }
+}
+
+/// Whether a line is a column of beams on a face of a body that they graze: it lies within the
+/// bounds of the body, which is much larger. A wire that passes a body sticks out of it.
+fn is_column_of(bodies: &Bodies<'_>, line: &[usize], body: &[usize]) -> bool {
+    let places = |of: &[usize]| of.iter().map(|at| bodies.voxels[*at].voxel).collect::<Vec<_>>();
+    let (line, body) = (places(line), places(body));
+    let is_within = |i: usize| {
+        let (least, most) = (body.iter().map(|v| v[i]).min(), body.iter().map(|v| v[i]).max());
+        let (Some(least), Some(most)) = (least, most) else { return false };
+        line.iter().all(|v| (least - IN_BOUNDS..=most + IN_BOUNDS).contains(&v[i]))
+    };
+    body.len() >= LARGER * line.len() && (0..3).all(is_within)
 }
 
 /// Joins bits with small gaps between them to bodies.

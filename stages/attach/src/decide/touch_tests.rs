@@ -165,3 +165,20 @@ fn a_column_to_which_a_hose_leads_stands_though_its_foot_is_hidden() {
     let n_moving = n_of(&out, &hose, PointKind::Attachment);
     assert!(10 * n_moving >= 9 * hose.len(), "{n_moving} of {}", hose.len());
 }
+
+#[test]
+fn a_part_in_the_air_has_the_columns_of_beams_that_graze_it_and_no_wire() {
+    let link = ResidualVoxel { n_residual: 0, n_link: 9, ..voxel([0, 0, 0], 1, 0) };
+    let far = |at: Voxel| ResidualVoxel { distance: 0.2, ..below(at) };
+    let part = shell([-12, -12, -30], [12, 12, -10], far);
+    let columns: Vec<_> =
+        [15, 19, 23].into_iter().flat_map(|x| (-27..-13).map(move |z| far([x, 12, z]))).collect();
+    let out = attached(&[vec![link], part.clone(), columns.clone()]);
+    for of in [&part, &columns] {
+        assert_eq!(n_of(&out, of, PointKind::Attachment), of.len());
+    }
+    let wire: Vec<_> = (-60..20).map(|z| far([15, 12, z])).collect();
+    let out = attached(&[vec![link], part.clone(), wire.clone()]);
+    assert_eq!(n_of(&out, &wire, PointKind::Attachment), 0);
+    assert_eq!(n_of(&out, &part, PointKind::Attachment), 0);
+}
