@@ -5,10 +5,11 @@
 //! A point that is labelled as fixed is dropped only with proof that nothing is there: beams of
 //! another scanner passed its place, its own beam passed an edge in front of it, and neither a
 //! surface, nor a line, a bar or a plane, nor a point of another scanner goes with it. Beams also
-//! pass beside a thing that is thinner than their distance, so that the first alone would drop wires
-//! and pipes. An uncertain point is dropped without such proof, too, if it lies alone in space that
-//! beams passed through, or if its beam grazed an edge in front of it and it belongs to nothing
-//! either. Whatever lies right beside an undoubted point stays.
+//! pass beside a thing that is thinner than their distance, so that the first alone would drop
+//! wires and pipes. An uncertain point is dropped without such proof, too, if it lies alone in
+//! space that beams passed through, or if its beam grazed an edge in front of it and it belongs to
+//! nothing either. What lies right beside an undoubted point, or amid such points in their plane,
+//! stays.
 
 use crate::grid::Grid;
 use crate::lines::{self, Offset};
