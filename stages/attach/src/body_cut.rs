@@ -5,7 +5,7 @@
 //! that they touch. A cut through what is bolted to a flange costs more. A hose is cut where
 //! another body holds it, and not within, and a bench is not cut off its legs.
 
-use crate::facets::{Bend, Facet};
+use crate::facets::{SurfaceTurn, VoxelFacet};
 use crate::max_flow::{FlowNetwork, UNCUT};
 use crate::thin::LocalShape;
 use crate::voxel_graph::Graph;
@@ -70,7 +70,7 @@ pub(crate) struct Body<'a> {
     pub(crate) is_fixed: Vec<bool>,
     pub(crate) shape: Vec<LocalShape>,
     /// The surface in each voxel.
-    pub(crate) facet: Vec<Facet>,
+    pub(crate) facet: Vec<VoxelFacet>,
 }
 
 impl Body<'_> {
@@ -119,9 +119,9 @@ impl Body<'_> {
             factor += u64::from(length.min(GROWS)) * SCALE / u64::from(DOUBLE);
         }
         factor = match self.facet[a].bend_to(&self.facet[b]) {
-            Bend::Inward => factor * INWARD[0] / INWARD[1],
-            Bend::Outward => factor * OUTWARD[0] / OUTWARD[1],
-            Bend::Unknown => factor,
+            SurfaceTurn::Inward => factor * INWARD[0] / INWARD[1],
+            SurfaceTurn::Outward => factor * OUTWARD[0] / OUTWARD[1],
+            SurfaceTurn::Unknown => factor,
         };
         // A hose is cut where another body holds it, and a leg nowhere.
         let enters_hose = |from: usize, to: usize| {

@@ -4,7 +4,7 @@
 use crate::attached::{Attached, Decided, Group, attached_to, mark};
 use crate::body_cut::{Body, TouchesRobot};
 use crate::bridges::bridges;
-use crate::facets::Facet;
+use crate::facets::VoxelFacet;
 use crate::floating::{self, Bodies};
 use crate::settings::Settings;
 use crate::share::{Share, share};
@@ -66,8 +66,8 @@ pub struct ResidualSum {
 /// Distance from a link up to which a voxel touches it and is not only near it, metres: the largest
 /// gate of the segmentation.
 const TOUCH: f32 = 0.012;
-/// Distance from a hand up to which a body may hang on a flange that no scan sees, metres: as far as
-/// a tool changer is thick.
+/// Distance from a hand up to which a body may hang on a flange that no scan sees, metres: as far
+/// as a tool changer is thick.
 const HIDDEN_MOUNT: f32 = 0.07;
 /// Longest tool of a robot, as a share of the robot's reach, and at least so long, metres: a spot
 /// welding gun of 1 m on an arm that reaches 3.1 m.
@@ -231,7 +231,7 @@ impl Attach {
             is_fixed,
             shape: of.shape.clone(),
             length: of.length.clone(),
-            facet: members.iter().map(|at| Facet::of(&voxels[*at])).collect(),
+            facet: members.iter().map(|at| VoxelFacet::of(&voxels[*at])).collect(),
         })
     }
 

@@ -18,7 +18,7 @@ const UP: f64 = 0.7;
 
 /// How the surface goes on from one voxel to another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Bend {
+pub(crate) enum SurfaceTurn {
     /// In an inner corner, or over a step.
     Inward,
     /// Flat, or round an outer edge.
@@ -28,14 +28,14 @@ pub(crate) enum Bend {
 
 /// The surface in a voxel.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Facet {
+pub(crate) struct VoxelFacet {
     /// Mean of its points, metres.
     middle: Vector,
     /// Mean unit normal towards the scanner.
     normal: Option<Vector>,
 }
 
-impl Facet {
+impl VoxelFacet {
     pub(crate) fn of(voxel: &ResidualVoxel) -> Self {
         let n = f64::from(voxel.n_residual.max(1));
         let within = voxel.surface.places.map(|sum| f64::from(sum) / 256.0 / n);
@@ -51,13 +51,17 @@ impl Facet {
     }
 
     /// How the surface goes on to another voxel.
-    pub(crate) fn bend_to(&self, other: &Self) -> Bend {
-        let (Some(a), Some(b)) = (self.normal, other.normal) else { return Bend::Unknown };
+    pub(crate) fn bend_to(&self, other: &Self) -> SurfaceTurn {
+        let (Some(a), Some(b)) = (self.normal, other.normal) else { return SurfaceTurn::Unknown };
         let Some(way) = (other.middle - self.middle).try_normalize(1e-9) else {
-            return Bend::Unknown;
+            return SurfaceTurn::Unknown;
         };
         let turn = (b - a).dot(&way);
         let rise = 0.5 * (a + b).dot(&way).abs();
-        if turn < -INWARD || a.dot(&b) > 0.7 && rise > STEP { Bend::Inward } else { Bend::Outward }
+        if turn < -INWARD || a.dot(&b) > 0.7 && rise > STEP {
+            SurfaceTurn::Inward
+        } else {
+            SurfaceTurn::Outward
+        }
     }
 }

@@ -11,7 +11,7 @@ const LIGHT: usize = 18;
 const WIDENS: usize = 3;
 /// Largest distance of the hand from the middle of such a side, in mean distances of its voxels.
 const CENTRED: f64 = 0.6;
-/// Way along what a robot holds, in longest tools: around a plate or a part it is longer than a tool.
+/// Way along what a robot holds, in longest tools: around a plate or a part it is longer than one.
 pub(crate) const LIGHT_TOOLS: u32 = 2;
 /// Least number of voxels behind a cut that must face up for something to rest on them.
 const LEAST_UP: usize = 6;
@@ -52,8 +52,8 @@ pub(crate) fn is_on_top(body: &Body<'_>, side: &[bool]) -> bool {
 }
 
 /// The thin part behind the cut of a side that hangs on it, as a hose that leads to what a robot
-/// holds; empty where it is on the side already, and `None` where the side may stand: what stands is
-/// held from below.
+/// holds; empty where it is on the side already, and `None` where the side may stand: what stands
+/// is held from below.
 pub(crate) fn line_that_holds(body: &Body<'_>, side: &[bool]) -> Option<Vec<bool>> {
     let is_at_cut = |k: &usize| body.graph.neighbours(*k).any(|(other, _)| !side[other]);
     let all: Vec<usize> = (0..side.len()).filter(|k| side[*k]).collect();

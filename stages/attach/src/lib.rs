@@ -9,8 +9,8 @@
 //! and once without. What both cuts leave to the robot moves, if it is a hose or near the hand.
 //! What they disagree on is uncertain, and the rest is fixed. Cuts follow inner corners of the
 //! surface, where things touch. What rests on something so lightly that it cannot stand there, or
-//! hangs on a hose besides, moves with the hand that it touches. A body in the air beside a hand, far
-//! from everything else, belongs to the hand.
+//! hangs on a hose besides, moves with the hand that it touches. A body in the air beside a hand,
+//! far from everything else, belongs to the hand.
 #![forbid(unsafe_code)]
 
 mod attached;

@@ -50,7 +50,7 @@ pub use label::{Label, PointKind};
 pub use lattice::{Lattice, Pixel};
 pub use point_raster::{OnRaster, PointRaster};
 pub use ptx::is_ptx_no_return;
-pub use residual::{LinkAt, PlaceRun, RESIDUAL_EDGE, ResidualVoxel, TileLabels, VoxelSurface};
+pub use residual::{LinkAt, PlaceRun, RESIDUAL_EDGE, ResidualVoxel, SurfaceSums, TileLabels};
 pub use scan::{Format, Input, InputId, Mask, MaskId, Scan, ScanId, ScannerPosition};
 pub use space::{Space, SpaceGrid, SpaceKind};
 pub use step::{Fan, Fold, Map, OneByOne, Weigh};

@@ -35,13 +35,13 @@ pub struct ResidualVoxel {
     /// Whether the voxel stands on the floor.
     pub grounded: bool,
     /// What is known of the surface in it.
-    pub surface: VoxelSurface,
+    pub surface: SurfaceSums,
 }
 
 /// Sums over the points without a label in a voxel, in whole numbers, so that the order of adding
 /// has no effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct VoxelSurface {
+pub struct SurfaceSums {
     /// Sum of the places within the voxel, 1/256 of its edge along world x, y and z.
     pub places: [u32; 3],
     /// Sum of the unit normals that point to the scanner, 1/256 along world x, y and z; of points
@@ -49,7 +49,7 @@ pub struct VoxelSurface {
     pub normals: [i32; 3],
 }
 
-impl VoxelSurface {
+impl SurfaceSums {
     /// That of one point at these places in its voxel (0 to 1), with its unit normal in the world.
     #[must_use]
     pub fn of(within: [f64; 3], normal: Option<[f64; 3]>) -> Self {
@@ -210,7 +210,7 @@ mod tests {
                 distance,
                 at_border,
                 grounded,
-                surface: VoxelSurface { places, normals },
+                surface: SurfaceSums { places, normals },
             };
             let voxels: Vec<ResidualVoxel> = parts.into_iter().map(voxel).collect();
             let join = |all: &[ResidualVoxel]| {

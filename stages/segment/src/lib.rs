@@ -31,6 +31,7 @@
 mod body;
 mod curves;
 mod field;
+mod gather;
 mod ground;
 mod raster;
 mod settings;

@@ -1,7 +1,7 @@
 //! Hoses, tools, workpieces and walls beside a two-link robot.
 
 use super::*;
-use contract::{JointFit, PointKind, Verdict, VoxelSurface};
+use contract::{JointFit, PointKind, SurfaceSums, Verdict};
 use geometry::{Aabb, Pose, Vector};
 use robot::{Joint, JointKind, Link, Motion, Role};
 use std::sync::Arc;
@@ -65,7 +65,7 @@ pub(super) fn voxel(at: Voxel, link: u16, n_away: i32) -> ResidualVoxel {
         distance: n_away as f32 * 0.02 + 0.01,
         at_border: false,
         grounded: false,
-        surface: VoxelSurface::default(),
+        surface: SurfaceSums::default(),
     }
 }
 

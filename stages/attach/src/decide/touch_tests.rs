@@ -3,7 +3,7 @@
 use super::tests::{attached, shell, voxel};
 use super::*;
 use crate::attached::Attached;
-use contract::{PointKind, VoxelSurface};
+use contract::{PointKind, SurfaceSums};
 
 fn below(at: Voxel) -> ResidualVoxel {
     voxel(at, 1, -at[2])
@@ -92,7 +92,7 @@ fn what_may_hang_on_a_hidden_flange_is_open() {
 
 /// A voxel of a face that is seen with this normal.
 fn faced(at: Voxel, normal: [i32; 3]) -> ResidualVoxel {
-    let surface = VoxelSurface { places: [640; 3], normals: normal.map(|v| 5 * 256 * v) };
+    let surface = SurfaceSums { places: [640; 3], normals: normal.map(|v| 5 * 256 * v) };
     ResidualVoxel { surface, ..below(at) }
 }
 
