@@ -41,13 +41,19 @@ fn scene(dir: &Path) -> PathBuf {
 }
 
 fn run(input: PathBuf, scanners: Option<PathBuf>, robots: &Path, out: PathBuf, threads: usize) {
+    run_job(&Job { scanners, ..job(input, robots, out, threads) });
+}
+
+fn job(input: PathBuf, robots: &Path, out: PathBuf, threads: usize) -> Job {
     let given = FlagValues { threads: Some(threads), ..FlagValues::default() };
     let means = Means::of(&given).expect("defaults hold");
-    let robots = robots.to_path_buf();
-    let job = Job { scanners, ..Job::new(vec![input], robots, out, means) };
-    let engine = Engine::new(threads);
-    let planned = estimate(&job, &engine).expect("it can be planned");
-    plan::run(&job, &engine).expect("the run ends well");
+    Job::new(vec![input], robots.to_path_buf(), out, means)
+}
+
+fn run_job(job: &Job) {
+    let engine = Engine::new(job.means.n_threads);
+    let planned = estimate(job, &engine).expect("it can be planned");
+    plan::run(job, &engine).expect("the run ends well");
     let written = n_bytes(&job.out);
     let most = planned.store_bytes + planned.output_bytes;
     assert!(written <= most, "{written} bytes are written, `plan` said {most}");
@@ -281,15 +287,31 @@ fn links_stand_as_told(out: &Path) {
 }
 
 #[test]
-fn las_without_scanner_positions_finds_it_and_doubts_it_and_a_lying_count_is_refused() {
+fn las_without_scanner_positions_has_them_found_or_doubts_and_a_lying_count_is_refused() {
     let dir = tempfile::tempdir().expect("a folder");
     let robots = scene(dir.path());
-    let (scans, out) = (dir.path().join("scans/scans.las"), dir.path().join("out"));
-    run(scans.clone(), None, &robots, out.clone(), 2);
-    let found = export::ResultFile::read(&out).expect("a result").robots;
-    assert_eq!(found.len(), 1);
-    assert_eq!(found[0].model, simulate::demo_robots::PALLETISER);
-    assert_eq!(found[0].verdict, "doubtful");
+    let scans = dir.path().join("scans/scans.las");
+    let robot = |out: &str, find_scanners: bool| {
+        let out = dir.path().join(out);
+        run_job(&Job { find_scanners, ..job(scans.clone(), &robots, out.clone(), 2) });
+        let mut found = export::ResultFile::read(&out).expect("a result").robots;
+        assert_eq!(found.len(), 1);
+        found.remove(0)
+    };
+    let seen = robot("found", true);
+    assert_eq!(seen.model, simulate::demo_robots::PALLETISER);
+    assert_eq!(seen.verdict, "trusted");
+    // Points that may be of several scanners stay without one.
+    let n_found = seen.scanners.0.iter().find(|(how, _)| how == "found").map_or(0, |s| s.1);
+    assert!(n_found >= 4, "{:?}", seen.scanners.0);
+    let truth = std::fs::read_to_string(dir.path().join("scans/truth/truth.json")).expect("truth");
+    let truth = &simulate::Truth::from_json(&truth).expect("parses").robots[0];
+    let off = (0..3).map(|i| (seen.base_pose.xyz[i] - truth.base_pose.xyz[i]).powi(2)).sum::<f64>();
+    assert!(off.sqrt() < 0.003, "{:?} for {:?}", seen.base_pose.xyz, truth.base_pose.xyz);
+    // Nothing proves free space where no scanner is known.
+    let doubted = robot("unknown", false);
+    assert_eq!(doubted.model, simulate::demo_robots::PALLETISER);
+    assert_eq!(doubted.verdict, "doubtful");
     // Half of the points that are there, as a writer leaves it that was stopped.
     let mut bytes = std::fs::read(&scans).expect("reads");
     let n = u64::from_le_bytes(bytes[247..255].try_into().expect("eight bytes"));
