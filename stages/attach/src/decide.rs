@@ -339,17 +339,9 @@ impl Fold for Attach {
 }
 
 impl ResidualSum {
-    /// Sorts the voxels and merges entries of the same voxel. Merging does not depend on the order,
-    /// so the result does not depend on when this is called.
+    /// Merges what was gathered; the result does not depend on when this is called.
     fn merge(&mut self) {
-        self.voxels.sort_by_key(|entry| entry.voxel);
-        self.voxels.dedup_by(|later, kept| {
-            let same = later.voxel == kept.voxel;
-            if same {
-                kept.join(later);
-            }
-            same
-        });
+        ResidualVoxel::merge(&mut self.voxels);
         self.n_merged = self.voxels.len();
     }
 }

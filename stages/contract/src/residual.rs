@@ -83,6 +83,18 @@ impl ResidualVoxel {
         self.grounded |= other.grounded;
         self.surface.join(&other.surface);
     }
+
+    /// Sorts voxels and joins entries of the same one. The result does not depend on their order.
+    pub fn merge(voxels: &mut Vec<Self>) {
+        voxels.sort_by_key(|entry| entry.voxel);
+        voxels.dedup_by(|later, kept| {
+            let same = later.voxel == kept.voxel;
+            if same {
+                kept.join(later);
+            }
+            same
+        });
+    }
 }
 
 /// The labels of one tile's points, as far as one tile alone determines them.

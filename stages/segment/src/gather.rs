@@ -78,14 +78,7 @@ pub(crate) fn gather(
     }
     PlaceRun::join(&mut out.labels);
     PlaceRun::join(&mut out.residuals);
-    out.voxels.sort_by_key(|entry| entry.voxel);
-    out.voxels.dedup_by(|later, kept| {
-        let same = later.voxel == kept.voxel;
-        if same {
-            kept.join(later);
-        }
-        same
-    });
+    ResidualVoxel::merge(&mut out.voxels);
     out
 }
 
