@@ -13,8 +13,8 @@ const MIN_SHARE_OF_GUESS: f64 = 0.75;
 /// right model was the best at its place each time.
 const MODELS_OF_PLACE: usize = 8;
 /// Share of the best score of a base of any model in the neighbourhood below which a base is not
-/// looked at more closely than at the coarse level.
-pub(super) const MIN_SHARE_COARSE: f64 = 0.6;
+/// looked at more closely than at the coarse level, nor at the middle one.
+pub(super) const MIN_SHARE_OF_LEVEL: f64 = 0.6;
 /// Factor on the number of base poses where heights are guessed, since each place then occurs at
 /// many heights.
 pub(super) const GUESS_BREADTH: usize = 8;

@@ -14,9 +14,9 @@ use crate::engine::AllThreads;
 use crate::engine::progress::Pieces;
 use crate::job::{Method, Settings};
 use crate::store::Store;
-use base_search::{BaseSearch, CoarseBases, RegionEvidence};
+use base_search::{BaseSearch, RatedBases, RegionEvidence};
 use contract::{Candidate, Fan, Fit, InstallationPlane, OneByOne, Region, Result, Scan, Verdict};
-use extent::{MIN_SHARE_COARSE, SAME_BASE, SPARE_PLACES, SearchExtent, base};
+use extent::{MIN_SHARE_OF_LEVEL, SAME_BASE, SPARE_PLACES, SearchExtent, base};
 use fit::{MeasuredScene, Prepared, ScansOfRegion};
 use geometry::{Aabb, Plane, Point, Pose, Vector};
 use rayon::prelude::*;
@@ -207,8 +207,8 @@ impl<'a, 'm> Search<'a, 'm> {
         robots.map(fit).collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
-    /// Candidates of all models on some planes, best base first. Between the coarse level and the
-    /// others, models are dropped at places where others score far higher.
+    /// Candidates of all models on some planes, best base first. After the coarse level and after
+    /// the middle one, models are dropped at places where others score far higher.
     fn candidates(
         &self,
         sight: &RegionEvidence<'_>,
@@ -216,23 +216,25 @@ impl<'a, 'm> Search<'a, 'm> {
         extent: SearchExtent,
     ) -> Vec<Candidate> {
         let n = self.library.models.len();
-        self.pieces.expect(n);
         let models = (0..n).into_par_iter();
-        let searches: Vec<Option<BaseSearch<'_>>> =
-            models.map(|index| self.search_of(index, sight, planes, extent)).collect();
-        let coarse = |search: &Option<BaseSearch<'_>>| {
-            search.as_ref().map(|s| s.coarse_bases(planes, &AllThreads)).unwrap_or_default()
+        let searches: Vec<BaseSearch<'_>> =
+            models.filter_map(|index| self.search_of(index, sight, planes, extent)).collect();
+        self.pieces.expect(searches.len());
+        let compete = |bases: Vec<RatedBases>| match extent.is_thorough {
+            true => bases,
+            false => base_search::drop_outscored(bases, MIN_SHARE_OF_LEVEL),
         };
-        let mut bases: Vec<CoarseBases> = searches.par_iter().map(coarse).collect();
-        if !extent.is_thorough {
-            base_search::drop_outscored(&mut bases, MIN_SHARE_COARSE);
-        }
-        let refined = |(search, coarse): (&Option<BaseSearch<'_>>, &CoarseBases)| {
-            let found = search.as_ref().map(|s| s.refine(planes, coarse, &AllThreads));
+        let coarse = searches.par_iter().map(|s| s.coarse_bases(planes, &AllThreads));
+        let coarse = compete(coarse.collect());
+        let middle = searches.par_iter().zip(&coarse);
+        let middle = middle.map(|(s, bases)| s.middle_bases(planes, bases, &AllThreads));
+        let middle = compete(middle.collect());
+        let refined = |(search, bases): (&BaseSearch<'_>, &RatedBases)| {
+            let found = search.refine(planes, bases, &AllThreads);
             self.pieces.done();
-            found.unwrap_or_default()
+            found
         };
-        let found: Vec<Vec<Candidate>> = searches.par_iter().zip(&bases).map(refined).collect();
+        let found: Vec<Vec<Candidate>> = searches.par_iter().zip(&middle).map(refined).collect();
         let mut out: Vec<Candidate> =
             found.into_iter().flatten().filter(|c| !c.bases.is_empty()).collect();
         out.sort_by(|a, b| b.bases[0].1.total_cmp(&a.bases[0].1).then(a.model.cmp(&b.model)));
@@ -294,6 +296,7 @@ impl<'a, 'm> Search<'a, 'm> {
             let found = found?;
             for (fit, candidate) in found.into_iter().zip(open) {
                 let Some(fit) = fit else { continue };
+                tried.add_end(&fit);
                 if fit.verdict == Verdict::Trusted {
                     taken.push((base(&fit.world_from_base), candidate.bases[0].1));
                 }

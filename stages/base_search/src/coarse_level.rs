@@ -1,12 +1,13 @@
 //! The coarse level of the search: every place on a plane that has points around it, at every yaw.
 //!
-//! Places lie in rows, and at each yaw a whole row is looked up at once.
+//! Places lie in rows, upright ones on walls, and at each yaw a whole row is looked up at once.
 
 use contract::{Fan, InstallationPlane};
 use geometry::{Plane, Pose, Vector};
+use nalgebra::UnitQuaternion;
 
 use crate::problem::BaseSearch;
-use crate::score_grid::{MAX_STRIDE, PlaceRow, Stencil};
+use crate::score_grid::{MAX_STRIDE, PlaceRow, RowAxis, Stencil};
 use crate::trial::{BaseTrial, SampleScore, Samples, coarse_yaw};
 
 /// Heights above a plane of the points that may belong to a base, metres: above the plane itself,
@@ -19,6 +20,9 @@ const MIN_CELLS: usize = 3;
 /// Fewest points of a filled cell.
 const MIN_IN_CELL: u32 = 3;
 
+/// Share of its length that an upright unit normal has along z at most, for rows along z.
+const UPRIGHT: f64 = 0.3;
+
 /// A place on the plane: x, y in its own coordinates, metres.
 type Place = (f64, f64);
 
@@ -27,8 +31,10 @@ struct TurnedBases<'s> {
     search: &'s BaseSearch<'s>,
     tolerance: f32,
     start: Place,
+    /// Along which rows of places lie.
+    axis: RowAxis,
     /// The pose of the plane's axes, and of the base at each yaw; region frame.
-    frame: nalgebra::UnitQuaternion<f64>,
+    frame: UnitQuaternion<f64>,
     poses: Vec<Pose>,
     /// The samples at each yaw as cells of the grid; `None` where there is no grid.
     stencils: Option<Vec<Stencil<'s>>>,
@@ -36,14 +42,15 @@ struct TurnedBases<'s> {
 
 impl<'s> TurnedBases<'s> {
     fn new(search: &'s BaseSearch<'s>, local: &Plane, start: Place) -> Self {
+        let axis = row_axis(local);
         let tolerance = search.coarse_tolerance();
         let n = (std::f64::consts::TAU / coarse_yaw()).round() as usize;
         let turned = |k: usize| search.pose(local, start.0, start.1, k as f64 * coarse_yaw());
         let poses: Vec<Pose> = (0..n).map(|k| turned(k) * search.root_from_base).collect();
         let samples = Samples::first(search.model, search.base, search.settings.n_coarse);
-        let stencil = |pose: &Pose| search.region.stencil(samples.points, pose, tolerance);
+        let stencil = |pose: &Pose| search.region.stencil(axis, samples.points, pose, tolerance);
         let stencils = poses.iter().map(stencil).collect();
-        Self { search, tolerance, start, frame: local.frame(), poses, stencils }
+        Self { search, tolerance, start, axis, frame: local.frame(), poses, stencils }
     }
 
     /// The shift to a place; region frame, metres.
@@ -82,14 +89,15 @@ impl<'s> TurnedBases<'s> {
         let stencil = self.stencils.as_ref()?.first()?;
         let cells = |p: &Place| stencil.cells(self.shift(*p).cast::<f32>().into());
         let first = cells(places.first()?);
-        let stride = places.get(1).map_or(0, |second| cells(second)[0] - first[0]);
-        let expected = |i: usize| [first[0] + stride * i as i32, first[1], first[2]];
-        let fits = |(i, place): &(usize, &Place)| cells(place) == expected(*i);
+        let at = self.axis.index();
+        let stride = places.get(1).map_or(0, |second| cells(second)[at] - first[at]);
+        let row = PlaceRow { axis: self.axis, first, stride: stride.clamp(1, MAX_STRIDE), n: 1 };
+        let fits = |(i, place): &(usize, &Place)| cells(place) == row.place(*i);
         let n = match (1..=MAX_STRIDE).contains(&stride) {
             true => places.iter().enumerate().take_while(fits).count(),
             false => 1,
         };
-        Some(PlaceRow { first, stride: stride.clamp(1, MAX_STRIDE), n })
+        Some(PlaceRow { n, ..row })
     }
 
     /// The trials worth a closer look at some places in a row, on plane `at`.
@@ -153,7 +161,9 @@ impl BaseSearch<'_> {
     /// Places on the plane (x, y in its own coordinates, metres) that have points above it within
     /// the base's radius, row by row.
     fn occupied(&self, plane: &InstallationPlane, local: &Plane, step: f64) -> Vec<(f64, f64)> {
-        let to_plane = local.frame().inverse();
+        // The rows' own axes, turned about the normal.
+        let (frame, turn) = (local.frame(), row_turn(local));
+        let to_plane = turn.inverse() * frame.inverse();
         let span = |corners: [[f64; 3]; 8], i: usize| {
             let along = corners.map(|c| (to_plane * Vector::from(c))[i]);
             along
@@ -204,8 +214,26 @@ impl BaseSearch<'_> {
                 }
             }
         }
-        let place =
-            |at: usize| (low[0] + (at % n[0]) as f64 * step, low[1] + (at / n[0]) as f64 * step);
+        let place = |at: usize| {
+            let [u, v] = [at % n[0], at / n[0]].map(|i| i as f64 * step);
+            let at = turn * Vector::new(low[0] + u, low[1] + v, 0.0);
+            (at.x, at.y)
+        };
         near.iter().enumerate().filter(|(_, n)| **n >= MIN_CELLS).map(|(at, _)| place(at)).collect()
     }
+}
+
+/// The axis along which rows of places on a plane lie.
+fn row_axis(plane: &Plane) -> RowAxis {
+    if plane.normal.z.abs() <= UPRIGHT { RowAxis::Z } else { RowAxis::X }
+}
+
+/// The turn about a plane's normal from its own axes to those of its rows: of an upright plane, the
+/// first one points upwards.
+fn row_turn(plane: &Plane) -> UnitQuaternion<f64> {
+    if row_axis(plane) == RowAxis::X {
+        return UnitQuaternion::identity();
+    }
+    let up = plane.frame().inverse() * Vector::z();
+    UnitQuaternion::from_axis_angle(&Vector::z_axis(), up.y.atan2(up.x))
 }

@@ -7,7 +7,7 @@ use geometry::probe::NO_RETURN_WEIGHT;
 use geometry::{Evidence, Probe};
 use std::sync::OnceLock;
 
-use crate::score_grid::{SCORE_UNIT, ScoreGrid, StridedScores, UNJUDGED};
+use crate::score_grid::{ReorderedScores, SCORE_UNIT, ScoreGrid, UNJUDGED};
 
 /// Edge of a cell, and of the cubes that points are counted in, metres: half of the finest
 /// tolerance of a quick score.
@@ -73,7 +73,7 @@ pub(crate) struct EvidenceGrid {
     cells: Vec<EvidenceCell>,
     /// The score of each cell for each of the tolerances, computed when first requested.
     scores: [OnceLock<Vec<i8>>; N_RUNGS],
-    strided: [StridedScores; N_RUNGS],
+    reordered: [ReorderedScores; N_RUNGS],
 }
 
 impl EvidenceGrid {
@@ -103,8 +103,8 @@ impl EvidenceGrid {
             layer
         };
         let cells = fan.fan((0..n[2]).collect(), layer).concat();
-        let (scores, strided) = Default::default();
-        Some(Self { min, edge, n, cells, scores, strided })
+        let (scores, reordered) = Default::default();
+        Some(Self { min, edge, n, cells, scores, reordered })
     }
 
     /// The scores at the available tolerance nearest to the requested one (metres); `None` if that
@@ -120,7 +120,7 @@ impl EvidenceGrid {
         let scores = self.scores[rung].get_or_init(|| self.score(tolerance));
         let min = std::array::from_fn(|i| self.min[i] - MARGIN[i] as f32 * self.edge);
         let n = self.wide().map(|n| n as i32);
-        Some(ScoreGrid { min, edge: self.edge, n, scores, strided: &self.strided[rung] })
+        Some(ScoreGrid { min, edge: self.edge, n, scores, reordered: &self.reordered[rung] })
     }
 
     /// Number of cells of the grid with its margin.

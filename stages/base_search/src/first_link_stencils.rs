@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use crate::first_link::FirstLink;
 use crate::problem::BaseSearch;
-use crate::score_grid::Stencil;
+use crate::score_grid::{RowAxis, Stencil};
 use crate::trial::{BaseTrial, SampleScore, Samples, coarse_yaw};
 
 /// Stencils of the first link for the trials of the coarse level.
@@ -94,7 +94,7 @@ impl StencilShift<'_, '_> {
             let samples = Samples::first(search.model, self.first.link, search.settings.n_coarse);
             let yaw = Pose::rotation(Vector::z() * (self.n_yaw as f64 * coarse_yaw()));
             let pose = self.origin.local_from_root * yaw * self.first.root_from_link[k];
-            search.region.stencil(samples.points, &pose, *tolerance)
+            search.region.stencil(RowAxis::X, samples.points, &pose, *tolerance)
         };
         let stencil = self.origin.stencils[self.n_yaw * n_values + k].get_or_init(make);
         stencil.as_ref().and_then(|stencil| stencil.look_up(self.shift, n_samples))

@@ -25,7 +25,7 @@ mod search;
 mod settings;
 mod trial;
 
-pub use outscored::{CoarseBases, drop_outscored};
+pub use outscored::{RatedBases, drop_outscored};
 pub use problem::BaseSearch;
 pub use region_evidence::RegionEvidence;
 pub use regions::{guessed_planes, level_planes, raised_planes, regions, stand_planes};

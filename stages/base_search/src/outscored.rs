@@ -10,9 +10,9 @@ use crate::trial::BaseTrial;
 /// found beside its middle.
 const NEIGHBOURHOOD: f64 = 0.35;
 
-/// Base poses of one model at the coarse level of a search.
+/// Base poses of one model at a level of a search.
 #[derive(Debug, Default)]
-pub struct CoarseBases {
+pub struct RatedBases {
     pub(crate) trials: Vec<BaseTrial>,
     /// Where each of them stands; region frame, metres.
     pub(crate) places: Vec<Vector>,
@@ -20,9 +20,10 @@ pub struct CoarseBases {
 
 /// Drops the bases of each model that score less than a share of the best one of any model in the
 /// neighbourhood.
-pub fn drop_outscored(models: &mut [CoarseBases], least_share: f64) {
+#[must_use]
+pub fn drop_outscored(models: Vec<RatedBases>, least_share: f64) -> Vec<RatedBases> {
     let mut cells: HashMap<[i32; 3], Vec<(Vector, f64)>> = HashMap::new();
-    for own in &*models {
+    for own in &models {
         for (at, trial) in own.places.iter().zip(&own.trials) {
             cells.entry(cell(at)).or_default().push((*at, trial.rating.score));
         }
@@ -41,12 +42,13 @@ pub fn drop_outscored(models: &mut [CoarseBases], least_share: f64) {
         }
         best
     };
-    for own in &mut *models {
+    let kept = |own: &RatedBases| {
         let kept = own.places.iter().zip(&own.trials);
         let kept = kept.filter(|(at, trial)| trial.rating.score >= least_share * best(at));
         let (places, trials) = kept.map(|(at, trial)| (*at, *trial)).unzip();
-        *own = CoarseBases { trials, places };
-    }
+        RatedBases { trials, places }
+    };
+    models.iter().map(kept).collect()
 }
 
 fn cell(at: &Vector) -> [i32; 3] {

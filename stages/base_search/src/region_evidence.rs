@@ -6,7 +6,7 @@ use geometry::probe::HIDDEN_PRICE;
 use geometry::{Aabb, Evidence, Eye, Pose, Probe, Vector};
 
 use crate::evidence_grid::{EDGE, EvidenceGrid, RUNG, WIDE};
-use crate::score_grid::{ScoreGrid, Stencil};
+use crate::score_grid::{RowAxis, ScoreGrid, Stencil};
 use crate::trial::{HIDDEN, SampleScore, Samples};
 
 /// The points of a small cube.
@@ -99,15 +99,17 @@ impl<'a> RegionEvidence<'a> {
         self.grid.as_ref().is_none_or(|grid| tolerance >= WIDE * grid.edge)
     }
 
-    /// Samples of a body at a pose that it is then shifted from, for many quick scores; `None` if
+    /// Samples of a body at a pose that it is then shifted from, mostly along an axis, for many
+    /// quick scores; `None` if
     /// the grid does not serve the tolerance (metres).
     pub(crate) fn stencil(
         &self,
+        axis: RowAxis,
         points: &[[f32; 3]],
         local_from_body: &Pose,
         tolerance: f32,
     ) -> Option<Stencil<'_>> {
-        self.at_tolerance(tolerance).map(|scores| scores.stencil(points, local_from_body))
+        self.at_tolerance(tolerance).map(|scores| scores.stencil(axis, points, local_from_body))
     }
 
     fn at_tolerance(&self, tolerance: f32) -> Option<ScoreGrid<'_>> {

@@ -12,7 +12,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use crate::first_link_score::PlausibleBases;
 use crate::first_link_stencils::FirstLinkStencils;
 use crate::hill_climb::SearchLevel;
-use crate::outscored::CoarseBases;
+use crate::outscored::RatedBases;
 use crate::problem::BaseSearch;
 use crate::regions::{GUESS_STEP, are_stacked};
 use crate::trial::{BaseTrial, SampleScore, Thinning, best, coarse_yaw};
@@ -43,12 +43,13 @@ impl BaseSearch<'_> {
     /// each place, best first.
     #[must_use]
     pub fn run(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> Vec<Candidate> {
-        self.refine(planes, &self.coarse_bases(planes, fan), fan)
+        let middle = self.middle_bases(planes, &self.coarse_bases(planes, fan), fan);
+        self.refine(planes, &middle, fan)
     }
 
     /// The coarse level of the search: base poses with their scores.
     #[must_use]
-    pub fn coarse_bases(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> CoarseBases {
+    pub fn coarse_bases(&self, planes: &[InstallationPlane], fan: &dyn Fan) -> RatedBases {
         let local = self.all_local(planes);
         let (thrift, mut trials) = (self.thrift, Vec::new());
         for at in self.coarse_planes(&local) {
@@ -78,20 +79,18 @@ impl BaseSearch<'_> {
             },
         );
         self.drop_low_scores(&mut trials, MIN_SHARE_COARSE);
-        let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
-        let places = trials.iter().map(at).collect();
-        CoarseBases { trials, places }
+        self.placed(&local, trials)
     }
 
-    /// Refines base poses of the coarse level on the same planes, and returns the candidates, one
-    /// for each place, best first.
+    /// The middle level of the search: the base poses around those of the coarse level on the same
+    /// planes.
     #[must_use]
-    pub fn refine(
+    pub fn middle_bases(
         &self,
         planes: &[InstallationPlane],
-        coarse: &CoarseBases,
+        coarse: &RatedBases,
         fan: &dyn Fan,
-    ) -> Vec<Candidate> {
+    ) -> RatedBases {
         let local = self.all_local(planes);
         let thrift = self.thrift;
         let (step, yaw_step) = (self.coarse_step(), coarse_yaw());
@@ -106,6 +105,22 @@ impl BaseSearch<'_> {
         };
         let mut trials = self.refine_level(&local, &coarse.trials, &middle, fan);
         self.drop_low_scores(&mut trials, MIN_SHARE_MIDDLE);
+        self.placed(&local, trials)
+    }
+
+    /// Refines base poses of the middle level on the same planes, and returns the candidates, one
+    /// for each place, best first.
+    #[must_use]
+    pub fn refine(
+        &self,
+        planes: &[InstallationPlane],
+        middle: &RatedBases,
+        fan: &dyn Fan,
+    ) -> Vec<Candidate> {
+        let local = self.all_local(planes);
+        let thrift = self.thrift;
+        let (step, yaw_step) = (self.coarse_step(), coarse_yaw());
+        let cells = self.breadth * self.n_cells();
         let per_place = self.settings.bases_per_place;
         let fine = SearchLevel {
             step: step / 4.0,
@@ -116,10 +131,17 @@ impl BaseSearch<'_> {
             is_quick: false,
         };
         let trials = match thrift.is_best_first {
-            true => self.refine_best_first(&local, &trials, &fine, fan),
-            false => self.refine_level(&local, &trials, &fine, fan),
+            true => self.refine_best_first(&local, &middle.trials, &fine, fan),
+            false => self.refine_level(&local, &middle.trials, &fine, fan),
         };
         self.group(planes, &local, &trials)
+    }
+
+    /// Trials with their places.
+    fn placed(&self, local: &[Plane], trials: Vec<BaseTrial>) -> RatedBases {
+        let at = |t: &BaseTrial| self.pose(&local[t.plane], t.x, t.y, 0.0).translation.vector;
+        let places = trials.iter().map(at).collect();
+        RatedBases { trials, places }
     }
 
     fn all_local(&self, planes: &[InstallationPlane]) -> Vec<Plane> {

@@ -44,7 +44,8 @@ pub fn rows(pose: &Pose) -> Rows {
 #[inline]
 #[must_use]
 pub fn transform(m: &Rows, p: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2] + m[r][3])
+    let row = |m: &[f32; 4]| m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3];
+    [row(&m[0]), row(&m[1]), row(&m[2])]
 }
 
 /// Applies a pose to places; the result is the same as that of [`transform`] for each of them.
@@ -64,7 +65,8 @@ pub fn transform_lanes(m: &Rows, p: &Lanes) -> Lanes {
 #[inline]
 #[must_use]
 pub fn rotate(m: &Rows, p: [f32; 3]) -> [f32; 3] {
-    std::array::from_fn(|r| m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2])
+    let row = |m: &[f32; 4]| m[0] * p[0] + m[1] * p[1] + m[2] * p[2];
+    [row(&m[0]), row(&m[1]), row(&m[2])]
 }
 
 impl DepthImage {

@@ -155,8 +155,12 @@ impl SampleBlock {
         let mut looks = [Looks::NOTHING; BLOCK / LANES];
         let n_lanes = n.div_ceil(LANES);
         for (k, looks) in looks.iter_mut().enumerate().take(n_lanes) {
-            let lanes = |axis: &[f32; BLOCK]| std::array::from_fn(|lane| axis[k * LANES + lane]);
-            *looks = eye.look_lanes(&local.each_ref().map(lanes), 0.5 * tolerance);
+            // Copied by loops: the compiler leaves arrays that closures make out of vectors.
+            let mut lanes = [[0.0; LANES]; 3];
+            for (lanes, axis) in lanes.iter_mut().zip(&local) {
+                lanes.copy_from_slice(&axis[k * LANES..][..LANES]);
+            }
+            *looks = eye.look_lanes(&lanes, 0.5 * tolerance);
         }
         for (looks, some) in looks.iter().zip(which[..n].chunks(LANES)) {
             let (through, on) = said(looks, tolerance);

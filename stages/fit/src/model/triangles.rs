@@ -330,8 +330,10 @@ fn towards(n: &Vector, ray: &Vector) -> Vector {
 /// any length; `None` where it passes beside it (Möller and Trumbore 1997).
 #[inline]
 fn crosses(corners: &[[f32; 3]; 3], BeamPlace { at, ray }: BeamPlace<'_>) -> Option<(f64, Vector)> {
-    let [a, b, c] = corners.map(|corner| Vector::from(corner.map(f64::from)));
-    let (u, v, w) = (b - a, c - a, at - a);
+    // Maps of arrays are not inlined here.
+    let of = |[x, y, z]: &[f32; 3]| Vector::new((*x).into(), (*y).into(), (*z).into());
+    let a = of(&corners[0]);
+    let (u, v, w) = (of(&corners[1]) - a, of(&corners[2]) - a, at - a);
     let across = ray.cross(&v);
     let whole = u.dot(&across);
     // Shares of the two edges in where the beam meets the plane, the whole of it being 1; along it
