@@ -33,6 +33,9 @@ pub(super) struct SearchExtent {
     pub(super) places: Option<usize>,
     /// Whether less of the search space is left out.
     pub(super) is_thorough: bool,
+    /// Whether models are dropped at places where others score far higher. Of what a depth camera
+    /// sees, bases say too little for that.
+    pub(super) competes: bool,
 }
 
 /// Places that are searched beyond those that are wanted, since some may lie where none is wanted.
@@ -43,7 +46,8 @@ impl SearchExtent {
     /// taken the points.
     pub(super) fn plain(planes: &[InstallationPlane]) -> Self {
         let is_thorough = planes.iter().all(InstallationPlane::is_guess);
-        Self { min_score: 0.0, breadth: breadth(planes), places: None, is_thorough }
+        let competes = !is_thorough;
+        Self { min_score: 0.0, breadth: breadth(planes), places: None, is_thorough, competes }
     }
 }
 

@@ -95,8 +95,8 @@ impl Search<'_, '_> {
         ] {
             let find = || {
                 let places = Some(MAX_MOUNTS);
-                let (min_score, is_thorough) = (MIN_MOUNT_SCORE, false);
-                let extent = SearchExtent { min_score, breadth, places, is_thorough };
+                let (min_score, is_thorough, competes) = (MIN_MOUNT_SCORE, false, true);
+                let extent = SearchExtent { min_score, breadth, places, is_thorough, competes };
                 self.candidates(sight, &planes, extent)
             };
             let mut hung = self.piece(scene.region, &name, find)?;
@@ -167,8 +167,8 @@ impl Search<'_, '_> {
         let planes = base_search::stand_planes(&region.world_bounds(), floor);
         let find = || {
             let (breadth, places) = (STAND_BREADTH, Some(MAX_MOUNTS));
-            let (min_score, is_thorough) = (MIN_STAND_SCORE, false);
-            let extent = SearchExtent { min_score, breadth, places, is_thorough };
+            let (min_score, is_thorough, competes) = (MIN_STAND_SCORE, false, true);
+            let extent = SearchExtent { min_score, breadth, places, is_thorough, competes };
             self.candidates(sight, &planes, extent)
         };
         let mut found = self.piece(region, "stands", find)?;
@@ -188,11 +188,13 @@ impl Search<'_, '_> {
         if !scene.evidence.has_beams() {
             return None;
         }
-        let trusted = || fits.iter().filter(|f| f.verdict == Verdict::Trusted);
-        let taken: Vec<Aabb> =
-            trusted().flat_map(|f| boxes(f, &self.library.models[f.model])).collect();
-        let is_much = sight.exclude_boxes(&taken, MIN_STANDING) >= MIN_LEFT;
-        is_much.then(|| trusted().map(|f| base(&f.world_from_base)).collect())
+        let is_much = sight.exclude_boxes(&self.taken(fits), MIN_STANDING) >= MIN_LEFT;
+        is_much.then(|| trusted(fits).map(|f| base(&f.world_from_base)).collect())
+    }
+
+    /// The boxes of the links of trusted robots, world frame, metres.
+    fn taken(&self, fits: &[Fit]) -> Vec<Aabb> {
+        trusted(fits).flat_map(|f| boxes(f, &self.library.models[f.model])).collect()
     }
 
     /// Fits of robots that moved between scans: where no robot is trusted, but a base like a
@@ -209,7 +211,9 @@ impl Search<'_, '_> {
             return Vec::new();
         }
         let extent = SearchExtent { is_thorough: true, ..SearchExtent::plain(scans.floors) };
-        let feet = self.candidates(&sight.scan_by_scan(), scans.floors, extent);
+        let mut sight = sight.scan_by_scan();
+        sight.exclude_boxes(&self.taken(fits), 0.0);
+        let feet = self.candidates(&sight, scans.floors, extent);
         let mut out: Vec<Fit> = Vec::new();
         let in_reach = |candidate: &&Candidate| {
             let here = base(&candidate.bases[0].0) - scans.region.origin.coords;
@@ -220,8 +224,8 @@ impl Search<'_, '_> {
         let feet = feet.iter().filter(|c| c.bases[0].1 >= MIN_FOOT).filter(in_reach);
         for candidate in feet.take(MAX_FEET) {
             let here = base(&candidate.bases[0].0);
-            let trusted = fits.iter().chain(&out).filter(|f| f.verdict == Verdict::Trusted);
-            if trusted.map(|f| base(&f.world_from_base)).any(|at| (at - here).norm() < SAME_BASE) {
+            let is_here = |f: &Fit| (base(&f.world_from_base) - here).norm() < SAME_BASE;
+            if trusted(fits).chain(trusted(&out)).any(is_here) {
                 continue;
             }
             let prepared = self.library.prepared(candidate.model);
@@ -230,6 +234,11 @@ impl Search<'_, '_> {
         }
         out
     }
+}
+
+/// The trusted ones of some fits.
+fn trusted(fits: &[Fit]) -> impl Iterator<Item = &Fit> {
+    fits.iter().filter(|f| f.verdict == Verdict::Trusted)
 }
 
 /// Whether a candidate lies apart from all of these bases.

@@ -112,7 +112,8 @@ impl Search<'_, '_> {
         if planes.is_empty() {
             return Vec::new();
         }
-        let extent = SearchExtent { min_score: 0.0, breadth, places: None, is_thorough: true };
+        let (min_score, is_thorough, competes) = (0.0, true, false);
+        let extent = SearchExtent { min_score, breadth, places: None, is_thorough, competes };
         let search = self.search_of(hint.model, sight, planes, extent);
         let mut found = search.map(|s| s.run(planes, &AllThreads)).unwrap_or_default();
         found.retain(|c| {

@@ -220,9 +220,9 @@ impl<'a, 'm> Search<'a, 'm> {
         let searches: Vec<BaseSearch<'_>> =
             models.filter_map(|index| self.search_of(index, sight, planes, extent)).collect();
         self.pieces.expect(searches.len());
-        let compete = |bases: Vec<RatedBases>| match extent.is_thorough {
-            true => bases,
-            false => base_search::drop_outscored(bases, MIN_SHARE_OF_LEVEL),
+        let compete = |bases: Vec<RatedBases>| match extent.competes {
+            true => base_search::drop_outscored(bases, MIN_SHARE_OF_LEVEL),
+            false => bases,
         };
         let coarse = searches.par_iter().map(|s| s.coarse_bases(planes, &AllThreads));
         let coarse = compete(coarse.collect());
@@ -249,7 +249,7 @@ impl<'a, 'm> Search<'a, 'm> {
         planes: &[InstallationPlane],
         extent: SearchExtent,
     ) -> Option<BaseSearch<'s>> {
-        let SearchExtent { min_score, breadth, places, is_thorough } = extent;
+        let SearchExtent { min_score, breadth, places, is_thorough, .. } = extent;
         let guessed = planes.iter().all(InstallationPlane::is_guess);
         let model = &self.library.models[index];
         let search = BaseSearch::new(index, model, sight, &self.settings.base_search)?;
