@@ -11,9 +11,8 @@ const RADIUS: f64 = 0.68;
 const N_COARSEST: f64 = 12.0;
 /// Factor from each radius to the next, which halves the area of a dart.
 const SHRINK: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Number of darts thrown for each sample that fits at a radius before the last; more fill holes
-/// that the next radius fills as well.
-const N_DARTS: f64 = 2.0;
+/// Number of darts thrown for each sample that fits at a radius.
+const N_DARTS: f64 = 6.0;
 
 pub(super) fn spread(
     candidates: Vec<SurfaceSample>,
