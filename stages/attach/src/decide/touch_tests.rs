@@ -58,6 +58,29 @@ fn a_plate_of_suction_cups_on_a_pile_moves_and_the_pile_does_not() {
 }
 
 #[test]
+fn a_plate_of_cups_whose_mount_is_hidden_is_no_fixed_thing() {
+    // Of the slender pole between flange and plate no point is nearer to the flange than 15 mm. In
+    // the second case a side of the plate is seen apart, without its cups.
+    for is_split in [false, true] {
+        let [mut tool, mut pile] = plate_on_cups();
+        tool.retain(|v| v.voxel[2] <= -7);
+        tool.extend((-6..=0).map(|z| below([0, 0, z])));
+        if is_split {
+            tool.retain(|v| v.voxel[0] < 3 || v.voxel[0] > 5 && v.voxel[2] > -9);
+        }
+        for v in tool.iter_mut().chain(&mut pile) {
+            v.distance += 0.005;
+        }
+        let out = attached(&[tool.clone(), pile.clone()]);
+        let n_fixed = n_of(&out, &tool, PointKind::Fixed);
+        assert!(20 * n_fixed <= tool.len(), "{n_fixed} of {}, {is_split}", tool.len());
+        assert_eq!(n_of(&out, &pile, PointKind::Attachment), 0);
+        let n_open = n_of(&out, &pile, PointKind::Uncertain);
+        assert!(20 * n_open <= pile.len(), "{n_open} of {}", pile.len());
+    }
+}
+
+#[test]
 fn a_table_beside_the_hand_is_no_plate_of_cups() {
     let [mut tool, _] = plate_on_cups();
     // The same below a tool's tip, but all to one side of it, and on legs to the floor.
