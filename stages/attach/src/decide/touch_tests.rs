@@ -1,6 +1,6 @@
 //! Tools that touch things, and things that stand beside a tool.
 
-use super::tests::{attached, shell, voxel};
+use super::tests::{attached, attached_to_one_of, shell, voxel};
 use super::*;
 use crate::attached::Attached;
 use contract::{PointKind, SurfaceSums};
@@ -204,4 +204,29 @@ fn a_part_in_the_air_has_the_columns_of_beams_that_graze_it_and_no_wire() {
     let out = attached(&[vec![link], part.clone(), wire.clone()]);
     assert_eq!(n_of(&out, &wire, PointKind::Attachment), 0);
     assert_eq!(n_of(&out, &part, PointKind::Attachment), 0);
+}
+
+#[test]
+fn a_hose_whose_end_is_hidden_moves_and_what_passes_or_stands_beside_the_robot_does_not() {
+    // The nearest voxel is 15 mm from the link.
+    let near = |at: Voxel, way: i32| {
+        let voxel = voxel(at, 1, way.abs());
+        ResidualVoxel { distance: voxel.distance + 0.005, ..voxel }
+    };
+    let hose: Vec<_> = (0..80).map(|k| near([k / 3, k * k / 200, k], k)).collect();
+    let passing: Vec<_> = (-60..80).map(|k| near([k / 3, 0, k], k)).collect();
+    let post: Vec<_> = (0..60).map(|k| near([0, 0, -k], k)).collect();
+    let n_moving = |of: &[ResidualVoxel], n_links: usize| {
+        let (mut of, n) = (of.to_vec(), of.len());
+        let stands = of[n - 1].voxel[2] < 0;
+        for end in &mut of[n - 3..] {
+            (end.at_border, end.grounded) = (!stands, stands);
+        }
+        n_of(&attached_to_one_of(n_links, &[of.clone()]), &of, PointKind::Attachment)
+    };
+    // Beside a hand, and beside another link.
+    for n_links in [2, 4] {
+        assert!(n_moving(&hose, n_links) >= 70, "{} of 80", n_moving(&hose, n_links));
+        assert_eq!([n_moving(&passing, n_links), n_moving(&post, n_links)], [0, 0], "{n_links}");
+    }
 }
