@@ -2,7 +2,7 @@
 //! and what a hose leads to.
 
 use crate::body_cut::{Body, TouchesRobot};
-use crate::layers::{N_BESIDE, N_FOLLOWED, THIN_NECK, layers_behind};
+use crate::layers::{N_BESIDE, N_FOLLOWED, N_FOLLOWED_NECK, THIN_NECK, layers_behind};
 use crate::thin::LocalShape;
 
 /// How many times more voxels a side has than touch it behind its cut, if it does not stand there.
@@ -75,21 +75,23 @@ pub(crate) fn line_that_holds(body: &Body<'_>, side: &[bool]) -> Option<Vec<bool
     if at_cut.is_empty() || height(&at_cut) <= height(&own) {
         return None;
     }
-    let is_thin = |layers: &[Vec<usize>]| {
-        let layers = &layers[N_BESIDE..N_BESIDE + N_FOLLOWED];
-        layers.iter().all(|layer| (1..=THIN_NECK).contains(&layer.len()))
+    let is_thin = |layer: &Vec<usize>| (1..=THIN_NECK).contains(&layer.len());
+    // A bit of the side may lie beside where the line begins, if the line is long.
+    let begin_of_line = |layers: &[Vec<usize>]| {
+        let is_short = layers[N_BESIDE..N_BESIDE + N_FOLLOWED].iter().all(is_thin);
+        let is_long = layers[N_FOLLOWED..N_FOLLOWED_NECK].iter().all(is_thin);
+        is_short.then_some(N_BESIDE).or(is_long.then_some(N_FOLLOWED))
     };
     let others: Vec<bool> = side.iter().map(|own| !own).collect();
     let mut line = vec![false; side.len()];
-    if is_thin(&layers_behind(body.graph, &others)) {
+    if begin_of_line(&layers_behind(body.graph, &others)) == Some(N_BESIDE) {
         return Some(line);
     }
     let mut at = layers_behind(body.graph, side);
-    if !is_thin(&at) {
-        return None;
-    }
+    let mut n_beside = begin_of_line(&at)?;
     let mut reached = side.to_vec();
-    while let Some(layer) = at.first().filter(|layer| (1..=THIN_NECK).contains(&layer.len())) {
+    while let Some(layer) = at.first().filter(|layer| n_beside > 0 || is_thin(layer)) {
+        n_beside = n_beside.saturating_sub(1);
         if layer.iter().any(|k| body.is_fixed[*k]) {
             break;
         }

@@ -5,6 +5,7 @@ use crate::body_cut::{Body, Preference, TouchesRobot};
 use crate::deeper::may_be_a_tool;
 use crate::held::{LIGHT_TOOLS, is_light_touch, is_on_top, line_that_holds};
 use crate::layers::{N_BESIDE, N_FOLLOWED, N_FOLLOWED_NECK, N_LAYERS, THIN_NECK, layers_behind};
+use crate::structure::parts;
 use crate::thin::{LocalShape, is_line, spreads_of};
 use crate::tool_shape::{LAYER, is_like_a_tool};
 use contract::Voxel;
@@ -13,6 +14,8 @@ use std::collections::BTreeMap;
 /// Way along a body from where it touches a robot up to which nothing of it is called fixed because
 /// of a cut alone, hundredths of a voxel's edge (15 cm): there may be a tool.
 const DOUBT: u32 = 750;
+/// Largest number of voxels of what a hose ends in.
+const HOSE_END: usize = 20;
 /// Way along a body up to which it is bolted to the robot whatever follows, hundredths of a voxel's
 /// edge (4 cm).
 const MOUNT: u32 = 200;
@@ -47,8 +50,8 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let is_whole = is_whole(body, &near);
     let mut is_light = is_light_touch(body, &near);
     // Wide flat surfaces are cut off near the robot, also those of a plate that it holds.
-    let line = line_that_holds(body, &far).filter(|_| !is_light);
-    if !is_light && (is_light_touch(body, &far) && is_on_top(body, &far) || line.is_some()) {
+    let line = line_that_holds(body, &far);
+    if line.is_some() || !is_light && is_light_touch(body, &far) && is_on_top(body, &far) {
         is_light = true;
         near.clone_from(&far);
     }
@@ -88,10 +91,16 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     (0..n).map(share).collect()
 }
 
-/// Whether only hoses lead from a side to what is not on it: all else hangs on the robot.
+/// Whether only hoses lead from a side to what is not on it: all else hangs on the robot. What a
+/// hose ends in, as a clamp, belongs to it.
 fn is_whole(body: &Body<'_>, side: &[bool]) -> bool {
-    let mut others = (0..side.len()).filter(|k| side[*k] && body.shape[*k] != LocalShape::Hose);
-    others.all(|k| body.graph.neighbours(k).all(|(other, _)| side[other]))
+    let is_inner = |k: &usize| body.graph.neighbours(*k).all(|(other, _)| side[other]);
+    let is_end = |part: &[usize]| {
+        let at_robot = part.iter().any(|k| body.contact[*k] != TouchesRobot::None);
+        !at_robot && part.len() <= HOSE_END
+    };
+    let others = parts(body.graph, |k| side[k] && body.shape[k] != LocalShape::Hose);
+    others.iter().all(|part| part.iter().all(is_inner) || is_end(part))
 }
 
 /// A side without its voxels beside the cut.
@@ -155,4 +164,40 @@ fn beside(body: &Body<'_>, side: &[bool]) -> Vec<bool> {
     let layers = layers_behind(body.graph, side);
     layers.iter().take(N_BESIDE).flatten().for_each(|k| beside[*k] = true);
     beside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::voxel_graph::Graph;
+
+    #[test]
+    fn what_a_hose_ends_in_belongs_to_it_and_a_thing_that_a_tool_touches_does_not() {
+        // A tool, a hose, and what that is held by, along x; the last voxel is beyond the cut.
+        let voxels: Vec<Voxel> = (0..60).map(|x| [x, 0, 0]).collect();
+        let graph = Graph::new(&voxels);
+        let is_whole_with = |hose: std::ops::Range<usize>| {
+            let shape = |k: usize| match hose.contains(&k) {
+                true => LocalShape::Hose,
+                false => LocalShape::Body,
+            };
+            let body = Body {
+                graph: &graph,
+                length: (0..60).map(|k| 100 * k).collect(),
+                from_hand: vec![None; 60],
+                longest_tool: 2500,
+                thin: 0.19,
+                contact: (0..60)
+                    .map(|k| if k == 0 { TouchesRobot::Touch } else { TouchesRobot::None })
+                    .collect(),
+                is_fixed: vec![false; 60],
+                shape: (0..60).map(shape).collect(),
+                facet: Vec::new(),
+            };
+            is_whole(&body, &(0..60).map(|k| k < 59).collect::<Vec<_>>())
+        };
+        assert!(is_whole_with(10..55));
+        assert!(!is_whole_with(10..30));
+        assert!(!is_whole_with(0..0));
+    }
 }

@@ -205,7 +205,7 @@ fn mark_way_back(graph: &Graph, length: &[u32], from: usize, is_hose: &mut [bool
 
 /// The voxels that are reached from some of them, with these, through those that are left; they are
 /// taken away from what is left.
-fn reached(graph: &Graph, mut from: Vec<usize>, is_left: &mut [bool]) -> Vec<usize> {
+pub(crate) fn reached(graph: &Graph, mut from: Vec<usize>, is_left: &mut [bool]) -> Vec<usize> {
     from.iter().for_each(|k| is_left[*k] = false);
     let mut next = 0;
     while let Some(&k) = from.get(next) {

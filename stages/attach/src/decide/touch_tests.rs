@@ -230,3 +230,33 @@ fn a_hose_whose_end_is_hidden_moves_and_what_passes_or_stands_beside_the_robot_d
         assert_eq!([n_moving(&passing, n_links), n_moving(&post, n_links)], [0, 0], "{n_links}");
     }
 }
+
+#[test]
+fn a_tool_on_a_hose_moves_whole_with_a_bit_beside_the_hose_and_a_clamp_at_its_end() {
+    let mut tool = shell([-3, -3, -10], [3, 3, 0], below);
+    tool.extend(shell([-10, -10, -12], [10, 10, -11], below));
+    let far = |at: Voxel| voxel(at, 1, 99);
+    let border = |at: Voxel| ResidualVoxel { at_border: true, ..far(at) };
+    tool.extend(shell([6, 6, -10], [10, 10, -6], below));
+    // From the plate up to a beam, with a knob: no hose by its shape.
+    let mut line: Vec<_> = (-5..60).map(|z| far([8, 8, z])).collect();
+    line.extend((0..60).map(|z| far([9, 8, z])));
+    let knob = shell([6, 6, -2], [10, 10, -1], far);
+    line.extend(knob.iter().filter(|v| v.voxel[..2] != [8, 8]));
+    let beam = shell([0, 0, 60], [40, 20, 64], border);
+    // From the mount to a clamp.
+    let mut hose: Vec<_> = (4..80).map(|k| far([k, 0, k / 2 - 8])).collect();
+    hose[0] = voxel([4, 0, -6], 1, 0);
+    let clamp = shell([80, -1, 31], [82, 1, 33], |at| match at[0] {
+        82 => border(at),
+        _ => far(at),
+    });
+    for held in [vec![line, beam], vec![hose, clamp]] {
+        let parts: Vec<_> = std::iter::once(tool.clone()).chain(held.clone()).collect();
+        let out = attached(&parts);
+        for (of, least) in [(&tool, 95), (&held[0], 90)] {
+            let n = n_of(&out, of, PointKind::Attachment);
+            assert!(100 * n >= least * of.len(), "{n} of {}", of.len());
+        }
+    }
+}
