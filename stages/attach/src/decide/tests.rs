@@ -230,6 +230,18 @@ fn a_hose_that_is_seen_sparsely_moves_up_to_where_it_is_held() {
 }
 
 #[test]
+fn a_gap_in_a_hose_is_bridged_although_mixed_pixels_hang_beside_it() {
+    let hose: Vec<_> = (0..80)
+        .filter(|k| !(18..20).contains(k))
+        .map(|k| ResidualVoxel { at_border: k >= 78, ..voxel([k / 2, 0, k], 1, k) })
+        .collect();
+    let mixed = vec![voxel([9, 5, 17], 1, 99), voxel([9, 4, 20], 1, 99)];
+    let out = attached(&[hose.clone(), mixed]);
+    let n = hose.iter().filter(|v| out.label(v.voxel).kind == PointKind::Attachment).count();
+    assert!(n >= 70, "{n} of {}", hose.len());
+}
+
+#[test]
 fn mixed_pixels_beside_a_carried_plate_do_not_hold_it() {
     let link = ResidualVoxel { n_residual: 0, n_link: 9, ..voxel([0, 0, 0], 1, 0) };
     let plate: Vec<_> =
