@@ -31,6 +31,7 @@ mod share;
 mod structure;
 mod thin;
 mod tool_shape;
+mod touched_line;
 mod voxel_graph;
 
 pub use attached::{Attached, Group};

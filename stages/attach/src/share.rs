@@ -8,6 +8,7 @@ use crate::layers::{N_BESIDE, N_FOLLOWED, N_FOLLOWED_NECK, N_LAYERS, THIN_NECK, 
 use crate::structure::parts;
 use crate::thin::{LocalShape, is_line, spreads_of};
 use crate::tool_shape::{LAYER, is_like_a_tool};
+use crate::touched_line::lines_at_a_tip;
 use contract::Voxel;
 use std::collections::BTreeMap;
 
@@ -74,6 +75,7 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let doubt = if is_touched { DOUBT } else { 0 };
     let beside = if is_touched { beside(body, &near) } else { vec![false; n] };
     let may_be_a_tool = may_be_a_tool(body);
+    let at_tip = if is_whole { vec![false; n] } else { lines_at_a_tip(body, &near) };
     // One voxel beside a cut may be on either side of it.
     let inside = inside(body, &near);
     let share = |k: usize| {
@@ -81,7 +83,7 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
         let held = if is_whole || body.from_hand[k].is_some() { held } else { held.min(MOUNT) };
         let is_held = inside[k] && (body.length[k] <= held || is_hose(k) || on_line[k]);
         match (near[k], far[k] || on_line[k]) {
-            (true, far) if is_held && (far || has_tip) => Share::Robot,
+            (true, far) if is_held && (far || has_tip) && !at_tip[k] => Share::Robot,
             (false, false) if body.is_fixed[k] => Share::Fixed,
             (false, false) if may_be_a_tool[k] => Share::Open,
             (false, false) if body.length[k] > doubt && !beside[k] => Share::Fixed,

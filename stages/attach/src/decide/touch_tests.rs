@@ -207,6 +207,25 @@ fn a_part_in_the_air_has_the_columns_of_beams_that_graze_it_and_no_wire() {
 }
 
 #[test]
+fn the_lines_of_beams_on_a_sheet_stay_when_a_tip_touches_one() {
+    let mut torch = shell([-3, -3, -8], [3, 3, 0], below);
+    torch.extend(shell([-1, -1, -25], [2, 2, -9], below));
+    torch.retain(|v| v.voxel[2] != -21);
+    // Around the tip the sheet is lines of beams that graze it, 8 cm apart.
+    let sheet = shell([-16, -16, -21], [30, 16, -21], |at| ResidualVoxel {
+        at_border: at[0] == 30,
+        ..below(at)
+    });
+    let is_seen = |v: &ResidualVoxel| v.voxel[0].abs() > 10 || v.voxel[1] % 4 == 0;
+    let sheet: Vec<_> = sheet.into_iter().filter(is_seen).collect();
+    let out = attached(&[torch.clone(), sheet.clone()]);
+    let n_lost = n_of(&out, &sheet, PointKind::Attachment);
+    assert!(n_lost <= 6, "{n_lost} of {}", sheet.len());
+    let n_moving = n_of(&out, &torch, PointKind::Attachment);
+    assert!(5 * n_moving >= 4 * torch.len(), "{n_moving} of {}", torch.len());
+}
+
+#[test]
 fn a_hose_whose_end_is_hidden_moves_and_what_passes_or_stands_beside_the_robot_does_not() {
     // The nearest voxel is 15 mm from the link.
     let near = |at: Voxel, way: i32| {
