@@ -138,7 +138,7 @@ fn cube(voxel: Voxel, half: i32) -> impl Iterator<Item = Voxel> {
     })
 }
 
-/// Whether the occupied space around a voxel is a thin curve, or a thin curve beside something else.
+/// Whether the occupied space around a voxel is a thin curve, or one beside something else.
 fn is_curve(occupied: &HashSet<Voxel>, voxel: Voxel) -> bool {
     let all: Vec<Voxel> =
         cube(voxel, AROUND).filter(|v| occupied.contains(v)).take(MAX_CURVE + 1).collect();
