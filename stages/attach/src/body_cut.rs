@@ -76,22 +76,43 @@ pub(crate) struct Body<'a> {
 impl Body<'_> {
     /// For each voxel, whether it is on the robot's side of the least cut.
     pub(crate) fn robot_side(&self, preference: Preference) -> Vec<bool> {
+        self.side(preference, |k| {
+            let touch = match self.contact[k] {
+                TouchesRobot::None => 0,
+                TouchesRobot::Near => NEAR_COST,
+                TouchesRobot::Touch => TOUCH_COST,
+            };
+            let is_flat = self.shape[k] == LocalShape::Flat && preference == Preference::NearRobot;
+            let is_bolted = self.from_hand[k].is_some_and(|length| length <= BOLTED);
+            let (letting_go, keeping) = match (is_flat, is_bolted) {
+                (true, _) => (0, FLAT_COST),
+                (false, true) => (BOLTED_COST, 0),
+                (false, false) => (0, 0),
+            };
+            [touch + letting_go, keeping].map(|cost| SCALE * cost)
+        })
+    }
+
+    /// For each voxel, whether it is on the side of a hand of the least cut behind all that is no
+    /// farther from the hand along the body, hundredths of a voxel's edge.
+    pub(crate) fn side_beyond(&self, depth: u32) -> Vec<bool> {
+        let is_within = |k: usize| self.from_hand[k].is_some_and(|length| length <= depth);
+        let is_kept = |k: usize| is_within(k) && !self.is_fixed[k];
+        self.side(Preference::NearFixed, |k| [if is_kept(k) { UNCUT } else { 0 }, 0])
+    }
+
+    /// The robot's side of the least cut where letting go of a voxel, and keeping it, cost so much.
+    fn side(&self, preference: Preference, ends: impl Fn(usize) -> [u64; 2]) -> Vec<bool> {
         let n = self.graph.len();
         let (source, sink) = (n, n + 1);
         let mut network = FlowNetwork::new(n + 2);
         for k in 0..n {
-            match self.contact[k] {
-                TouchesRobot::None => {}
-                TouchesRobot::Near => network.add(source, k, SCALE * NEAR_COST),
-                TouchesRobot::Touch => network.add(source, k, SCALE * TOUCH_COST),
-            }
-            if self.shape[k] == LocalShape::Flat && preference == Preference::NearRobot {
-                network.add(k, sink, SCALE * FLAT_COST);
-            } else if self.from_hand[k].is_some_and(|length| length <= BOLTED) {
-                network.add(source, k, SCALE * BOLTED_COST);
-            }
-            if self.is_fixed[k] {
-                network.add(k, sink, UNCUT);
+            let [letting_go, keeping] = ends(k);
+            let keeping = if self.is_fixed[k] { UNCUT } else { keeping };
+            for (from, to, cost) in [(source, k, letting_go), (k, sink, keeping)] {
+                if cost > 0 {
+                    network.add(from, to, cost);
+                }
             }
             for (other, step) in self.graph.neighbours(k).filter(|(other, _)| *other > k) {
                 let cost = self.cost(k, other, step, preference);

@@ -39,7 +39,7 @@ pub(crate) fn bridges(graph: &Graph, thin: f64) -> Vec<(usize, usize, u32)> {
             }
         });
         if let Some((distance, other)) = nearest
-            && is_on_a_line(graph, &voxels, [at, other], thin)
+            && is_on_a_line(graph, &voxels, &component, [at, other], thin)
         {
             out.push((at, other, (100.0 * distance / RESIDUAL_EDGE) as u32));
         }
@@ -47,12 +47,25 @@ pub(crate) fn bridges(graph: &Graph, thin: f64) -> Vec<(usize, usize, u32)> {
     out
 }
 
-/// Whether all that is near the middle between two voxels lies along one thin line.
-fn is_on_a_line(graph: &Graph, voxels: &NearVoxels, ends: [usize; 2], thin: f64) -> bool {
+/// Whether all that is near the middle between two voxels lies along one thin line, or all of it
+/// that belongs to their two components: mixed pixels may hang beside.
+fn is_on_a_line(
+    graph: &Graph,
+    voxels: &NearVoxels,
+    component: &[usize],
+    ends: [usize; 2],
+    thin: f64,
+) -> bool {
     let [a, b] = ends.map(|end| graph.voxel(end));
     let middle = [0, 1, 2].map(|i| (a[i] + b[i]).div_euclid(2));
-    let mut near = Vec::new();
-    voxels.around(middle, AROUND, |_, at| near.push(graph.voxel(at as usize)));
-    let spread = spreads_of(&near, middle);
-    near.len() >= MIN_VOXELS && is_line(&spread, thin, MIN_RATIO)
+    let (mut near, mut own) = (Vec::new(), Vec::new());
+    voxels.around(middle, AROUND, |_, at| {
+        near.push(graph.voxel(at as usize));
+        if ends.iter().any(|end| component[*end] == component[at as usize]) {
+            own.push(graph.voxel(at as usize));
+        }
+    });
+    [near, own]
+        .iter()
+        .any(|near| near.len() >= MIN_VOXELS && is_line(&spreads_of(near, middle), thin, MIN_RATIO))
 }

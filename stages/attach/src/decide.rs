@@ -211,8 +211,13 @@ impl Attach {
         let is_too_far = |k: usize| {
             of.length[k] > too_far && matches!(of.shape[k], LocalShape::Body | LocalShape::Flat)
         };
-        let contact = |at: &usize| match voxels[*at].distance <= TOUCH {
-            _ if !self.reaches(&voxels[*at], reach) => TouchesRobot::None,
+        let is_grounded = |k: usize| voxels[members[k]].grounded;
+        let ends = thin::ending_hoses(&of.graph, &of.length, &of.shape, is_grounded);
+        let mut from_hand = self.ways_from_hand(of);
+        let passes = |k: &usize| of.shape[*k] == LocalShape::Hose && !ends[*k];
+        (0..members.len()).filter(passes).for_each(|k| from_hand[k] = None);
+        let contact = |k: usize| match voxels[members[k]].distance <= TOUCH || ends[k] {
+            _ if !self.reaches(&voxels[members[k]], reach) => TouchesRobot::None,
             true => TouchesRobot::Touch,
             false => TouchesRobot::Near,
         };
@@ -224,10 +229,10 @@ impl Attach {
         let is_fixed = (0..members.len()).map(is_fixed).collect();
         share(&Body {
             graph: &of.graph,
-            from_hand: self.ways_from_hand(of),
+            from_hand,
             longest_tool,
             thin: self.settings.thin,
-            contact: members.iter().map(contact).collect(),
+            contact: (0..members.len()).map(contact).collect(),
             is_fixed,
             shape: of.shape.clone(),
             length: of.length.clone(),

@@ -4,7 +4,7 @@
 use crate::attached::{Decided, Group, attached_to, mark};
 use crate::near_voxels::NearVoxels;
 use crate::thin::{is_line, spreads_of};
-use contract::{LinkAt, PointKind, ResidualVoxel, Voxel};
+use contract::{Label, LinkAt, PointKind, ResidualVoxel, Voxel};
 
 /// Least distance from everything fixed, metres, and in distances from the hand.
 const ALONE: f64 = 0.10;
@@ -44,7 +44,7 @@ pub(crate) struct Bodies<'a> {
 
 /// Attaches bodies that hang in the air to the hand that they are near, the nearest first.
 pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
-    let (mut hands, mut fixed) = (NearVoxels::default(), NearVoxels::default());
+    let [mut hands, mut fixed, mut doubtful] = [(); 3].map(|()| NearVoxels::default());
     for voxel in bodies.links.iter().filter(|v| (bodies.is_hand)(v.nearest)) {
         hands.add(voxel.voxel, mark(voxel.nearest));
     }
@@ -70,7 +70,7 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
                         hands.add(bodies.voxels[at].voxel, mark(link));
                     }
                 }
-                Some(_) => {}
+                Some(_) => doubtful.add(bodies.voxels[at].voxel, 0),
             }
         }
     }
@@ -96,6 +96,22 @@ pub(crate) fn attach(bodies: &Bodies<'_>, decided: &mut Decided) {
         }
         decided.groups.push(group);
     }
+    for members in open.iter().filter(|members| is_bit_of(bodies, members, &doubtful, &fixed)) {
+        members.iter().for_each(|at| decided.labels[*at] = Some(Label::UNCERTAIN));
+    }
+}
+
+/// Whether a body in the air may be a bit of something near it that is in doubt: of a wide tool, of
+/// which some is hidden. What is fixed is farther away.
+fn is_bit_of(
+    bodies: &Bodies<'_>,
+    members: &[usize],
+    doubtful: &NearVoxels,
+    fixed: &NearVoxels,
+) -> bool {
+    let places = || members.iter().map(|&at| bodies.voxels[at].voxel);
+    let gap = doubtful.nearest(places(), BIT_GAP).map(|found| found.0);
+    gap.is_some_and(|gap| fixed.nearest(places(), gap).is_none())
 }
 
 /// Whether connected voxels lie along a line that is longer than bits of tools: a wire or a cable,

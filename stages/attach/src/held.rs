@@ -2,7 +2,7 @@
 //! and what a hose leads to.
 
 use crate::body_cut::{Body, TouchesRobot};
-use crate::layers::{N_BESIDE, N_FOLLOWED, THIN_NECK, layers_behind};
+use crate::layers::{N_BESIDE, N_FOLLOWED, N_FOLLOWED_NECK, THIN_NECK, layers_behind};
 use crate::thin::LocalShape;
 
 /// How many times more voxels a side has than touch it behind its cut, if it does not stand there.
@@ -22,11 +22,16 @@ const TOUCHED: usize = 2;
 /// it: a plate of suction cups on a pile. Behind the cut the body must become wide at once, as legs
 /// of a bench do not, and the side must be centred beside the hand, as a bench rarely is.
 pub(crate) fn is_light_touch(body: &Body<'_>, side: &[bool]) -> bool {
+    is_lightly_touching(body, side, CENTRED)
+}
+
+/// The same with another bound of how far from its middle the hand may be.
+pub(crate) fn is_lightly_touching(body: &Body<'_>, side: &[bool], centred: f64) -> bool {
     let layers = layers_behind(body.graph, side);
     let n_touched = layers[0].len();
     let own = compact(body, side);
     let widens = layers[..N_FOLLOWED].iter().any(|layer| layer.len() >= WIDENS * n_touched);
-    n_touched > 0 && own.len() >= LIGHT * n_touched && widens && is_centred(body, &own)
+    n_touched > 0 && own.len() >= LIGHT * n_touched && widens && is_centred(body, &own, centred)
 }
 
 /// The voxels of a side that are no hose; none where one of them is farther from the robot than a
@@ -70,21 +75,23 @@ pub(crate) fn line_that_holds(body: &Body<'_>, side: &[bool]) -> Option<Vec<bool
     if at_cut.is_empty() || height(&at_cut) <= height(&own) {
         return None;
     }
-    let is_thin = |layers: &[Vec<usize>]| {
-        let layers = &layers[N_BESIDE..N_BESIDE + N_FOLLOWED];
-        layers.iter().all(|layer| (1..=THIN_NECK).contains(&layer.len()))
+    let is_thin = |layer: &Vec<usize>| (1..=THIN_NECK).contains(&layer.len());
+    // A bit of the side may lie beside where the line begins, if the line is long.
+    let begin_of_line = |layers: &[Vec<usize>]| {
+        let is_short = layers[N_BESIDE..N_BESIDE + N_FOLLOWED].iter().all(is_thin);
+        let is_long = layers[N_FOLLOWED..N_FOLLOWED_NECK].iter().all(is_thin);
+        is_short.then_some(N_BESIDE).or(is_long.then_some(N_FOLLOWED))
     };
     let others: Vec<bool> = side.iter().map(|own| !own).collect();
     let mut line = vec![false; side.len()];
-    if is_thin(&layers_behind(body.graph, &others)) {
+    if begin_of_line(&layers_behind(body.graph, &others)) == Some(N_BESIDE) {
         return Some(line);
     }
     let mut at = layers_behind(body.graph, side);
-    if !is_thin(&at) {
-        return None;
-    }
+    let mut n_beside = begin_of_line(&at)?;
     let mut reached = side.to_vec();
-    while let Some(layer) = at.first().filter(|layer| (1..=THIN_NECK).contains(&layer.len())) {
+    while let Some(layer) = at.first().filter(|layer| n_beside > 0 || is_thin(layer)) {
+        n_beside = n_beside.saturating_sub(1);
         if layer.iter().any(|k| body.is_fixed[*k]) {
             break;
         }
@@ -98,7 +105,7 @@ pub(crate) fn line_that_holds(body: &Body<'_>, side: &[bool]) -> Option<Vec<bool
 }
 
 /// Whether voxels lie about those of them that touch the robot, seen from above.
-fn is_centred(body: &Body<'_>, own: &[usize]) -> bool {
+fn is_centred(body: &Body<'_>, own: &[usize], most: f64) -> bool {
     let place = |k: &usize| body.graph.voxel(*k).map(f64::from);
     let mean = |chosen: &[usize]| {
         let sum = chosen.iter().map(place).fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);
@@ -109,5 +116,5 @@ fn is_centred(body: &Body<'_>, own: &[usize]) -> bool {
     let (hand, middle) = (mean(&hand), mean(own));
     let away = |v: [f64; 3]| (v[0] - middle[0]).hypot(v[1] - middle[1]);
     let spread = own.iter().map(|k| away(place(k))).sum::<f64>() / own.len() as f64;
-    away([hand[0], hand[1], 0.0]) <= CENTRED * spread
+    away([hand[0], hand[1], 0.0]) <= most * spread
 }

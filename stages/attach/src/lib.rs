@@ -7,16 +7,18 @@
 //! A component that touches a moving link and nothing fixed is an attachment. A component that
 //! touches both is cut where that costs least, twice: once where a cut near the robot is preferred,
 //! and once without. What both cuts leave to the robot moves, if it is a hose or near the hand.
-//! What they disagree on is uncertain, and the rest is fixed. Cuts follow inner corners of the
-//! surface, where things touch. What rests on something so lightly that it cannot stand there, or
-//! hangs on a hose besides, moves with the hand that it touches. A body in the air beside a hand,
-//! far from everything else, belongs to the hand.
+//! What they disagree on is uncertain, and so is what a deeper cut leaves to the hand, if that may
+//! be a tool; the rest is fixed. Cuts follow inner corners of the surface, where things touch. What
+//! rests on something so lightly that it cannot stand there, or hangs on a hose besides, moves with
+//! the hand that it touches. A body in the air beside a hand, far from everything else, belongs to
+//! the hand.
 #![forbid(unsafe_code)]
 
 mod attached;
 mod body_cut;
 mod bridges;
 mod decide;
+mod deeper;
 mod facets;
 mod floating;
 mod held;
@@ -28,6 +30,8 @@ mod settings;
 mod share;
 mod structure;
 mod thin;
+mod tool_shape;
+mod touched_line;
 mod voxel_graph;
 
 pub use attached::{Attached, Group};

@@ -2,26 +2,24 @@
 //! the robot and one that is not.
 
 use crate::body_cut::{Body, Preference, TouchesRobot};
+use crate::deeper::may_be_a_tool;
 use crate::held::{LIGHT_TOOLS, is_light_touch, is_on_top, line_that_holds};
 use crate::layers::{N_BESIDE, N_FOLLOWED, N_FOLLOWED_NECK, N_LAYERS, THIN_NECK, layers_behind};
+use crate::structure::parts;
 use crate::thin::{LocalShape, is_line, spreads_of};
+use crate::tool_shape::{LAYER, is_like_a_tool};
+use crate::touched_line::lines_at_a_tip;
 use contract::Voxel;
 use std::collections::BTreeMap;
 
 /// Way along a body from where it touches a robot up to which nothing of it is called fixed because
 /// of a cut alone, hundredths of a voxel's edge (15 cm): there may be a tool.
 const DOUBT: u32 = 750;
+/// Largest number of voxels of what a hose ends in.
+const HOSE_END: usize = 20;
 /// Way along a body up to which it is bolted to the robot whatever follows, hundredths of a voxel's
 /// edge (4 cm).
 const MOUNT: u32 = 200;
-/// Range of the largest number of voxels of a tool in two neighbouring levels, if it has more than
-/// three times as many there than [`LEVELS_BESIDE`] levels (6 cm) above and below: a level plate
-/// whose sides are half of the longest tool, from 25 cm to 40 cm. What is wider is the top of a
-/// bench or a part that the tool touches. In any case a tool has no more than three times as many.
-const MAX_LEVEL: [usize; 2] = [150, 400];
-const LEVELS_BESIDE: i32 = 3;
-/// Way along a body over which its voxels are counted as one layer, hundredths of a voxel's edge.
-const LAYER: u32 = 100;
 /// How many times longer than thick a thin neck is.
 const NECK_RATIO: f64 = 3.0;
 /// Least number of voxels in a layer of a neck with which what is behind it is compared.
@@ -53,8 +51,8 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let is_whole = is_whole(body, &near);
     let mut is_light = is_light_touch(body, &near);
     // Wide flat surfaces are cut off near the robot, also those of a plate that it holds.
-    let line = line_that_holds(body, &far).filter(|_| !is_light);
-    if !is_light && (is_light_touch(body, &far) && is_on_top(body, &far) || line.is_some()) {
+    let line = line_that_holds(body, &far);
+    if line.is_some() || !is_light && is_light_touch(body, &far) && is_on_top(body, &far) {
         is_light = true;
         near.clone_from(&far);
     }
@@ -76,6 +74,8 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let is_touched = body.contact.contains(&TouchesRobot::Touch);
     let doubt = if is_touched { DOUBT } else { 0 };
     let beside = if is_touched { beside(body, &near) } else { vec![false; n] };
+    let may_be_a_tool = may_be_a_tool(body);
+    let at_tip = if is_whole { vec![false; n] } else { lines_at_a_tip(body, &near) };
     // One voxel beside a cut may be on either side of it.
     let inside = inside(body, &near);
     let share = |k: usize| {
@@ -83,8 +83,9 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
         let held = if is_whole || body.from_hand[k].is_some() { held } else { held.min(MOUNT) };
         let is_held = inside[k] && (body.length[k] <= held || is_hose(k) || on_line[k]);
         match (near[k], far[k] || on_line[k]) {
-            (true, far) if is_held && (far || has_tip) => Share::Robot,
+            (true, far) if is_held && (far || has_tip) && !at_tip[k] => Share::Robot,
             (false, false) if body.is_fixed[k] => Share::Fixed,
+            (false, false) if may_be_a_tool[k] => Share::Open,
             (false, false) if body.length[k] > doubt && !beside[k] => Share::Fixed,
             _ => Share::Open,
         }
@@ -92,35 +93,16 @@ pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     (0..n).map(share).collect()
 }
 
-/// Whether only hoses lead from a side to what is not on it: all else hangs on the robot.
+/// Whether only hoses lead from a side to what is not on it: all else hangs on the robot. What a
+/// hose ends in, as a clamp, belongs to it.
 fn is_whole(body: &Body<'_>, side: &[bool]) -> bool {
-    let mut others = (0..side.len()).filter(|k| side[*k] && body.shape[*k] != LocalShape::Hose);
-    others.all(|k| body.graph.neighbours(k).all(|(other, _)| side[other]))
-}
-
-/// Whether what is on the robot's side of a cut may be a tool, hoses aside: it is no longer than
-/// one, has no wide level surface, and becomes no wider far from the hand, as a bench does behind
-/// the tip that touches it.
-fn is_like_a_tool(body: &Body<'_>, side: &[bool]) -> bool {
-    let (mut widths, mut levels) = (BTreeMap::new(), BTreeMap::new());
-    for k in (0..side.len()).filter(|k| side[*k] && body.shape[*k] != LocalShape::Hose) {
-        if body.length[k] > body.longest_tool {
-            return false;
-        }
-        *widths.entry(body.length[k] / LAYER).or_insert(0_usize) += 1;
-        *levels.entry(body.graph.voxel(k)[2]).or_insert(0_usize) += 1;
-    }
-    let width = |at: u32| widths.get(&at).copied().unwrap_or(0);
-    let at_hand = widths.range(..DOUBT / LAYER).map(|(_, n)| *n).max().unwrap_or(0);
-    let is_wider = |at: &u32| 2 * (width(*at) + width(at + 1) + width(at + 2)) > 9 * at_hand;
-    let side = (body.longest_tool / (2 * LAYER)) as usize;
-    let most = (side * side).clamp(MAX_LEVEL[0], MAX_LEVEL[1]);
-    let level = |at: i32| [at, at + 1].iter().filter_map(|at| levels.get(at)).sum::<usize>();
-    let is_wide = |at: &i32| {
-        let beside = level(at - LEVELS_BESIDE).max(level(at + LEVELS_BESIDE));
-        level(*at) > most && (level(*at) > 3 * most || level(*at) > 3 * beside)
+    let is_inner = |k: &usize| body.graph.neighbours(*k).all(|(other, _)| side[other]);
+    let is_end = |part: &[usize]| {
+        let at_robot = part.iter().any(|k| body.contact[*k] != TouchesRobot::None);
+        !at_robot && part.len() <= HOSE_END
     };
-    !widths.keys().filter(|at| **at >= DOUBT / LAYER).any(is_wider) && !levels.keys().any(is_wide)
+    let others = parts(body.graph, |k| side[k] && body.shape[k] != LocalShape::Hose);
+    others.iter().all(|part| part.iter().all(is_inner) || is_end(part))
 }
 
 /// A side without its voxels beside the cut.
@@ -191,36 +173,33 @@ mod tests {
     use super::*;
     use crate::voxel_graph::Graph;
 
-    fn is_a_tool(voxels: &[Voxel]) -> bool {
-        let graph = Graph::new(voxels);
-        let n = voxels.len();
-        let body = Body {
-            graph: &graph,
-            length: voxels.iter().map(|v| 100 * v[2].unsigned_abs()).collect(),
-            from_hand: voxels.iter().map(|v| Some(100 * v[2].unsigned_abs())).collect(),
-            longest_tool: 2500,
-            thin: 0.19,
-            contact: vec![TouchesRobot::None; n],
-            is_fixed: vec![false; n],
-            shape: vec![LocalShape::Body; n],
-            facet: Vec::new(),
-        };
-        is_like_a_tool(&body, &vec![true; n])
-    }
-
-    /// A solid block of this width between two heights below a hand.
-    fn block(width: i32, heights: std::ops::Range<i32>) -> Vec<Voxel> {
-        let level = |z: i32| (0..width).flat_map(move |x| (0..width).map(move |y| [x, y, -z]));
-        heights.flat_map(level).collect()
-    }
-
     #[test]
-    fn a_bench_behind_a_tool_is_no_tool() {
-        let tool = block(4, 0..10);
-        assert!(is_a_tool(&tool));
-        // A wide top, a body that is wider than the tool, and one that is too long.
-        assert!(!is_a_tool(&[tool.clone(), block(10, 10..12)].concat()));
-        assert!(!is_a_tool(&[tool.clone(), block(7, 10..16)].concat()));
-        assert!(!is_a_tool(&[tool, block(4, 10..30)].concat()));
+    fn what_a_hose_ends_in_belongs_to_it_and_a_thing_that_a_tool_touches_does_not() {
+        // A tool, a hose, and what that is held by, along x; the last voxel is beyond the cut.
+        let voxels: Vec<Voxel> = (0..60).map(|x| [x, 0, 0]).collect();
+        let graph = Graph::new(&voxels);
+        let is_whole_with = |hose: std::ops::Range<usize>| {
+            let shape = |k: usize| match hose.contains(&k) {
+                true => LocalShape::Hose,
+                false => LocalShape::Body,
+            };
+            let body = Body {
+                graph: &graph,
+                length: (0..60).map(|k| 100 * k).collect(),
+                from_hand: vec![None; 60],
+                longest_tool: 2500,
+                thin: 0.19,
+                contact: (0..60)
+                    .map(|k| if k == 0 { TouchesRobot::Touch } else { TouchesRobot::None })
+                    .collect(),
+                is_fixed: vec![false; 60],
+                shape: (0..60).map(shape).collect(),
+                facet: Vec::new(),
+            };
+            is_whole(&body, &(0..60).map(|k| k < 59).collect::<Vec<_>>())
+        };
+        assert!(is_whole_with(10..55));
+        assert!(!is_whole_with(10..30));
+        assert!(!is_whole_with(0..0));
     }
 }

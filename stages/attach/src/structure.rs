@@ -1,7 +1,7 @@
 //! Things that only a hose leads to and that are too large to hang on it: a column to which a hose
 //! is clamped, whose foot no scan sees.
 
-use crate::thin::LocalShape;
+use crate::thin::{LocalShape, reached};
 use crate::voxel_graph::Graph;
 use contract::Voxel;
 
@@ -17,27 +17,23 @@ pub(crate) fn beyond_hoses(
     shape: &[LocalShape],
     is_at_robot: impl Fn(usize) -> bool,
 ) -> Vec<bool> {
-    let n = graph.len();
-    let is_hose = |k: usize| shape[k] == LocalShape::Hose;
-    let mut is_taken: Vec<bool> = (0..n).map(is_hose).collect();
-    let mut out = vec![false; n];
-    for first in 0..n {
-        if std::mem::replace(&mut is_taken[first], true) {
-            continue;
-        }
-        let mut part = vec![first];
-        let mut next = 0;
-        while let Some(&k) = part.get(next) {
-            next += 1;
-            for (other, _) in graph.neighbours(k) {
-                if !std::mem::replace(&mut is_taken[other], true) {
-                    part.push(other);
-                }
-            }
-        }
+    let mut out = vec![false; graph.len()];
+    for part in parts(graph, |k| shape[k] != LocalShape::Hose) {
         let places: Vec<Voxel> = part.iter().map(|k| graph.voxel(*k)).collect();
         if is_large(&places) && !part.iter().any(|k| is_at_robot(*k)) {
             part.iter().for_each(|k| out[*k] = true);
+        }
+    }
+    out
+}
+
+/// The connected parts of some voxels of a graph.
+pub(crate) fn parts(graph: &Graph, is_in: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+    let mut is_left: Vec<bool> = (0..graph.len()).map(is_in).collect();
+    let mut out = Vec::new();
+    for first in 0..graph.len() {
+        if is_left[first] {
+            out.push(reached(graph, vec![first], &mut is_left));
         }
     }
     out

@@ -22,6 +22,8 @@ const BEGIN: u32 = 200;
 const NEXT: std::ops::Range<u32> = 500..700;
 /// Least distance between these, voxels: half of the least way.
 const MIN_ALONG: f64 = 2.5;
+/// Least cosine of the angle with the vertical of something upright (18°).
+const UPRIGHT: f64 = 0.95;
 /// Least cosine of the angle between the sides of something straight (37°).
 const STRAIGHT: f64 = 0.8;
 /// Least number of voxels within [`AROUND`] of one on a flat surface: two thirds of a disc.
@@ -81,37 +83,42 @@ pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<LocalShape
     shapes
 }
 
-/// A long thin part that begins not far from the robot.
-struct LatePart {
+/// A long thin part that leads away from the robot.
+struct ThinPart {
     voxels: Vec<usize>,
     /// Where it begins, and the way from there along its first stretch, voxels.
     begin: [f64; 3],
     along: [f64; 3],
 }
 
-impl LatePart {
-    /// `None` where a thin part is too short or begins too far from the robot.
+impl ThinPart {
+    /// `None` where it leads away to both sides.
     fn of(graph: &Graph, length: &[u32], voxels: Vec<usize>) -> Option<Self> {
-        let ways = || voxels.iter().map(|k| length[*k]);
-        let (begins, ends) = (ways().min()?, ways().max()?);
-        let is_late = |(latest, least): &(u32, u32)| begins <= *latest && ends - begins >= *least;
-        if !LATE_HOSES.iter().any(is_late) {
-            return None;
-        }
+        let begins = voxels.iter().map(|k| length[*k]).min()?;
         let mean = |range: std::ops::Range<u32>| {
-            let (mut sum, mut n) = ([0.0; 3], 0.0);
-            for k in voxels.iter().filter(|k| range.contains(&(length[**k] - begins))) {
-                let at = graph.voxel(*k).map(f64::from);
-                (0..3).for_each(|i| sum[i] += at[i]);
-                n += 1.0;
-            }
-            sum.map(|v| v / n)
+            mean_of(graph, voxels.iter().filter(|k| range.contains(&(length[**k] - begins))))
         };
         let (begin, next) = (mean(0..BEGIN), mean(NEXT));
         let along: [f64; 3] = std::array::from_fn(|i| next[i] - begin[i]);
         // What leads away to both sides is on average where it begins.
         let is_one_way = along.iter().map(|v| v * v).sum::<f64>() >= MIN_ALONG * MIN_ALONG;
         is_one_way.then_some(Self { voxels, begin, along })
+    }
+
+    /// Whether it begins not far from the robot for its length.
+    fn is_late_hose(&self, length: &[u32]) -> bool {
+        let ways = || self.voxels.iter().map(|k| length[*k]);
+        let (begins, ends) = (ways().min().unwrap_or(0), ways().max().unwrap_or(0));
+        LATE_HOSES.iter().any(|(latest, least)| begins <= *latest && ends - begins >= *least)
+    }
+
+    /// Whether it stands upright on the floor, as a post does.
+    fn is_post(&self, graph: &Graph, length: &[u32], is_grounded: impl Fn(usize) -> bool) -> bool {
+        let ends = self.voxels.iter().map(|k| length[*k]).max().unwrap_or(0);
+        let end = mean_of(graph, self.voxels.iter().filter(|k| length[**k] + BEGIN >= ends));
+        let by: [f64; 3] = std::array::from_fn(|i| end[i] - self.begin[i]);
+        let is_upright = -by[2] >= UPRIGHT * by.iter().map(|v| v * v).sum::<f64>().sqrt();
+        is_upright && self.voxels.iter().any(|k| is_grounded(*k))
     }
 
     /// Whether this and another part are the two sides of something straight that passes.
@@ -125,6 +132,40 @@ impl LatePart {
     }
 }
 
+/// The middle of some voxels.
+fn mean_of<'a>(graph: &Graph, of: impl Iterator<Item = &'a usize>) -> [f64; 3] {
+    let (mut sum, mut n) = ([0.0; 3], 0.0);
+    for k in of {
+        let at = graph.voxel(*k).map(f64::from);
+        (0..3).for_each(|i| sum[i] += at[i]);
+        n += 1.0;
+    }
+    sum.map(|v| v / n)
+}
+
+/// For each voxel, whether it belongs to a hose that ends at the robot: it leads away to one side
+/// only, and is no post that stands beside the robot.
+pub(crate) fn ending_hoses(
+    graph: &Graph,
+    length: &[u32],
+    shape: &[LocalShape],
+    is_grounded: impl Fn(usize) -> bool,
+) -> Vec<bool> {
+    let mut is_left: Vec<bool> = shape.iter().map(|shape| *shape == LocalShape::Hose).collect();
+    let mut out = vec![false; shape.len()];
+    for first in 0..shape.len() {
+        if !is_left[first] {
+            continue;
+        }
+        let voxels = reached(graph, vec![first], &mut is_left);
+        let part = ThinPart::of(graph, length, voxels);
+        if let Some(part) = part.filter(|part| !part.is_post(graph, length, &is_grounded)) {
+            part.voxels.iter().for_each(|k| out[*k] = true);
+        }
+    }
+    out
+}
+
 /// Marks long thin parts that begin not far from the robot, where several hoses lie side by side.
 /// Such a part leads away from the robot; a pipe that passes leads away to both sides.
 fn mark_late_hoses(graph: &Graph, length: &[u32], is_left: &mut [bool], is_hose: &mut [bool]) {
@@ -132,7 +173,8 @@ fn mark_late_hoses(graph: &Graph, length: &[u32], is_left: &mut [bool], is_hose:
     for first in 0..is_left.len() {
         if is_left[first] {
             let voxels = reached(graph, vec![first], is_left);
-            parts.extend(LatePart::of(graph, length, voxels));
+            let part = ThinPart::of(graph, length, voxels);
+            parts.extend(part.filter(|part| part.is_late_hose(length)));
         }
     }
     for part in parts.iter().filter(|part| !parts.iter().any(|other| part.continues(other))) {
@@ -163,7 +205,7 @@ fn mark_way_back(graph: &Graph, length: &[u32], from: usize, is_hose: &mut [bool
 
 /// The voxels that are reached from some of them, with these, through those that are left; they are
 /// taken away from what is left.
-fn reached(graph: &Graph, mut from: Vec<usize>, is_left: &mut [bool]) -> Vec<usize> {
+pub(crate) fn reached(graph: &Graph, mut from: Vec<usize>, is_left: &mut [bool]) -> Vec<usize> {
     from.iter().for_each(|k| is_left[*k] = false);
     let mut next = 0;
     while let Some(&k) = from.get(next) {

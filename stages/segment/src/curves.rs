@@ -17,6 +17,11 @@ const MAX_CURVE: usize = 50;
 const MAX_ACROSS: f64 = 0.9;
 /// Least standard deviation along it, voxels.
 const MIN_ALONG: f64 = 1.2;
+/// The same of what is connected within a smaller cube (10 cm), where something else stands beside
+/// the curve, as a fence does.
+const AROUND_APART: i32 = 2;
+const MAX_ACROSS_APART: f64 = 0.75;
+const MIN_ALONG_APART: f64 = 1.2;
 /// Gaps that a curve is followed across, voxels: black rubber returns few points.
 const GAP: i32 = 2;
 /// Depth of the layer at the border of the surroundings in which curves are looked for, metres.
@@ -133,26 +138,53 @@ fn cube(voxel: Voxel, half: i32) -> impl Iterator<Item = Voxel> {
     })
 }
 
-/// Whether the occupied space around a voxel is a thin curve.
+/// Whether the occupied space around a voxel is a thin curve, or one beside something else.
 fn is_curve(occupied: &HashSet<Voxel>, voxel: Voxel) -> bool {
-    let (mut n, mut sum, mut squares) = (0_usize, [0.0; 3], [[0.0; 3]; 3]);
-    for other in cube(voxel, AROUND).filter(|v| occupied.contains(v)) {
-        n += 1;
-        if n > MAX_CURVE {
-            return false;
-        }
-        let by = [0, 1, 2].map(|i| f64::from(other[i] - voxel[i]));
+    let all: Vec<Voxel> =
+        cube(voxel, AROUND).filter(|v| occupied.contains(v)).take(MAX_CURVE + 1).collect();
+    if all.len() > MAX_CURVE {
+        return false;
+    }
+    let [across, along] = spreads(&all, voxel);
+    if across <= MAX_ACROSS && along >= MIN_ALONG {
+        return true;
+    }
+    let [across, along] = spreads(&connected(&all, voxel), voxel);
+    across <= MAX_ACROSS_APART && along >= MIN_ALONG_APART
+}
+
+/// The voxels that are connected to one of them within the smaller cube around it, with it.
+fn connected(all: &[Voxel], voxel: Voxel) -> Vec<Voxel> {
+    let is_near = |a: &Voxel, b: &Voxel, by: i32| (0..3).all(|i| (a[i] - b[i]).abs() <= by);
+    let mut left: Vec<Voxel> =
+        all.iter().copied().filter(|v| *v != voxel && is_near(v, &voxel, AROUND_APART)).collect();
+    let mut out = vec![voxel];
+    let mut next = 0;
+    while let Some(&at) = out.get(next) {
+        next += 1;
+        let (beside, others) = left.into_iter().partition(|v| is_near(v, &at, 1));
+        left = others;
+        out.extend::<Vec<Voxel>>(beside);
+    }
+    out
+}
+
+/// Standard deviations of voxels, voxels: the second largest, and the largest along one direction.
+fn spreads(of: &[Voxel], centre: Voxel) -> [f64; 2] {
+    let (mut sum, mut squares) = ([0.0; 3], [[0.0; 3]; 3]);
+    for other in of {
+        let by = [0, 1, 2].map(|i| f64::from(other[i] - centre[i]));
         for i in 0..3 {
             sum[i] += by[i];
             (0..3).for_each(|j| squares[i][j] += by[i] * by[j]);
         }
     }
-    let scale = 1.0 / n.max(1) as f64;
+    let scale = 1.0 / of.len().max(1) as f64;
     let covariance =
         nalgebra::Matrix3::from_fn(|i, j| scale * squares[i][j] - scale * scale * sum[i] * sum[j]);
-    let mut across = covariance.symmetric_eigenvalues().map(|v| v.max(0.0).sqrt());
-    across.as_mut_slice().sort_unstable_by(f64::total_cmp);
-    across[1] <= MAX_ACROSS && across[2] >= MIN_ALONG
+    let mut spread = covariance.symmetric_eigenvalues().map(|v| v.max(0.0).sqrt());
+    spread.as_mut_slice().sort_unstable_by(f64::total_cmp);
+    [spread[1], spread[2]]
 }
 
 #[cfg(test)]
@@ -166,5 +198,9 @@ mod tests {
         let sheet: HashSet<Voxel> = (-9..9).flat_map(|x| (-9..9).map(move |y| [x, y, 0])).collect();
         assert!(!is_curve(&sheet, [0, 0, 0]));
         assert!(!is_curve(&HashSet::from([[0, 0, 0]]), [0, 0, 0]));
+        // A hose 15 cm beside the wires of a fence.
+        let mut both = hose;
+        both.extend((-9..9).flat_map(|z| [[0, 3, z], [4, 3, z]]));
+        assert!(is_curve(&both, [0, 0, 0]));
     }
 }

@@ -6,7 +6,8 @@ use geometry::{Aabb, Pose, Vector};
 use robot::{Joint, JointKind, Link, Motion, Role};
 use std::sync::Arc;
 
-fn model() -> Model {
+/// A robot whose base carries an arm, and each link of the arm the next one.
+fn model(n_links: usize) -> Model {
     let link = |name: &str, parent_joint| Link {
         name: name.into(),
         role: Role::Main,
@@ -15,41 +16,44 @@ fn model() -> Model {
         cad: Arc::default(),
         bounds: Aabb::EMPTY,
     };
-    let joint = Joint {
-        name: "j1".into(),
+    let joint = |k: usize| Joint {
+        name: format!("j{}", k + 1),
         kind: JointKind::Revolute,
-        parent: 0,
-        child: 1,
+        parent: k,
+        child: k + 1,
         parent_from_joint: Pose::identity(),
         axis: Vector::z_axis(),
         limits: None,
-        motion: Motion::Free(0),
+        motion: Motion::Free(k),
     };
+    let arm = (1..n_links).map(|k| link("arm", Some(k - 1)));
     Model {
         name: "m".into(),
-        links: vec![link("base", None), link("arm", Some(0))],
-        joints: vec![joint],
-        free: vec![0],
+        links: std::iter::once(link("base", None)).chain(arm).collect(),
+        joints: (0..n_links - 1).map(joint).collect(),
+        free: (0..n_links - 1).collect(),
         loops: Vec::new(),
-        main_chain: vec![0],
+        main_chain: (0..n_links - 1).collect(),
         symmetries: Vec::new(),
         mesh_sigmas: Vec::new(),
     }
 }
 
-fn fit() -> Fit {
+fn fit(n_links: usize) -> Fit {
     Fit {
         model: 0,
         model_name: "m".into(),
         world_from_base: Pose::identity(),
         base_sigma: [0.0; 6],
-        joints: vec![JointFit {
-            name: "j1".into(),
-            value: 0.0,
-            sigma: 0.0,
-            certainty: contract::Certainty::Determined,
-            ..JointFit::default()
-        }],
+        joints: (1..n_links)
+            .map(|k| JointFit {
+                name: format!("j{k}"),
+                value: 0.0,
+                sigma: 0.0,
+                certainty: contract::Certainty::Determined,
+                ..JointFit::default()
+            })
+            .collect(),
         verdict: Verdict::Trusted,
         ..Fit::default()
     }
@@ -70,7 +74,12 @@ pub(super) fn voxel(at: Voxel, link: u16, n_away: i32) -> ResidualVoxel {
 }
 
 pub(super) fn attached(parts: &[Vec<ResidualVoxel>]) -> Attached {
-    let attach = Attach::new(&[fit()], &[model()], Settings::default());
+    attached_to_one_of(2, parts)
+}
+
+/// What is attached to a robot of so many links; the last one is its hand.
+pub(super) fn attached_to_one_of(n_links: usize, parts: &[Vec<ResidualVoxel>]) -> Attached {
+    let attach = Attach::new(&[fit(n_links)], &[model(n_links)], Settings::default());
     let mut sum = attach.empty();
     for part in parts {
         attach.add(&mut sum, part.clone()).expect("add");
@@ -128,7 +137,7 @@ fn a_cable_between_base_and_arm_is_shared() {
 
 #[test]
 fn the_result_does_not_depend_on_the_order_of_parts() {
-    let attach = Attach::new(&[fit()], &[model()], Settings::default());
+    let attach = Attach::new(&[fit(2)], &[model(2)], Settings::default());
     let part = |k: i32| -> Vec<ResidualVoxel> {
         (0..40).map(|z| voxel([(z * 7 + k) % 3, k % 2, z], 1, (z * 13 + k * 5) % 37)).collect()
     };
@@ -218,6 +227,18 @@ fn a_hose_that_is_seen_sparsely_moves_up_to_where_it_is_held() {
     let out = attached(std::slice::from_ref(&hose));
     let n = hose.iter().filter(|v| out.label(v.voxel).kind == PointKind::Attachment).count();
     assert!(n >= 40, "{n} of {}", hose.len());
+}
+
+#[test]
+fn a_gap_in_a_hose_is_bridged_although_mixed_pixels_hang_beside_it() {
+    let hose: Vec<_> = (0..80)
+        .filter(|k| !(18..20).contains(k))
+        .map(|k| ResidualVoxel { at_border: k >= 78, ..voxel([k / 2, 0, k], 1, k) })
+        .collect();
+    let mixed = vec![voxel([9, 5, 17], 1, 99), voxel([9, 4, 20], 1, 99)];
+    let out = attached(&[hose.clone(), mixed]);
+    let n = hose.iter().filter(|v| out.label(v.voxel).kind == PointKind::Attachment).count();
+    assert!(n >= 70, "{n} of {}", hose.len());
 }
 
 #[test]

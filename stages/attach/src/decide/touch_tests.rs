@@ -1,6 +1,6 @@
 //! Tools that touch things, and things that stand beside a tool.
 
-use super::tests::{attached, shell, voxel};
+use super::tests::{attached, attached_to_one_of, shell, voxel};
 use super::*;
 use crate::attached::Attached;
 use contract::{PointKind, SurfaceSums};
@@ -55,6 +55,29 @@ fn a_plate_of_suction_cups_on_a_pile_moves_and_the_pile_does_not() {
     let n_moving = n_of(&out, &tool, PointKind::Attachment);
     assert!(10 * n_moving >= 9 * tool.len(), "{n_moving} of {}", tool.len());
     assert_eq!(n_of(&out, &pile, PointKind::Attachment), 0);
+}
+
+#[test]
+fn a_plate_of_cups_whose_mount_is_hidden_is_no_fixed_thing() {
+    // Of the slender pole between flange and plate no point is nearer to the flange than 15 mm. In
+    // the second case a side of the plate is seen apart, without its cups.
+    for is_split in [false, true] {
+        let [mut tool, mut pile] = plate_on_cups();
+        tool.retain(|v| v.voxel[2] <= -7);
+        tool.extend((-6..=0).map(|z| below([0, 0, z])));
+        if is_split {
+            tool.retain(|v| v.voxel[0] < 3 || v.voxel[0] > 5 && v.voxel[2] > -9);
+        }
+        for v in tool.iter_mut().chain(&mut pile) {
+            v.distance += 0.005;
+        }
+        let out = attached(&[tool.clone(), pile.clone()]);
+        let n_fixed = n_of(&out, &tool, PointKind::Fixed);
+        assert!(20 * n_fixed <= tool.len(), "{n_fixed} of {}, {is_split}", tool.len());
+        assert_eq!(n_of(&out, &pile, PointKind::Attachment), 0);
+        let n_open = n_of(&out, &pile, PointKind::Uncertain);
+        assert!(20 * n_open <= pile.len(), "{n_open} of {}", pile.len());
+    }
 }
 
 #[test]
@@ -181,4 +204,78 @@ fn a_part_in_the_air_has_the_columns_of_beams_that_graze_it_and_no_wire() {
     let out = attached(&[vec![link], part.clone(), wire.clone()]);
     assert_eq!(n_of(&out, &wire, PointKind::Attachment), 0);
     assert_eq!(n_of(&out, &part, PointKind::Attachment), 0);
+}
+
+#[test]
+fn the_lines_of_beams_on_a_sheet_stay_when_a_tip_touches_one() {
+    let mut torch = shell([-3, -3, -8], [3, 3, 0], below);
+    torch.extend(shell([-1, -1, -25], [2, 2, -9], below));
+    torch.retain(|v| v.voxel[2] != -21);
+    // Around the tip the sheet is lines of beams that graze it, 8 cm apart.
+    let sheet = shell([-16, -16, -21], [30, 16, -21], |at| ResidualVoxel {
+        at_border: at[0] == 30,
+        ..below(at)
+    });
+    let is_seen = |v: &ResidualVoxel| v.voxel[0].abs() > 10 || v.voxel[1] % 4 == 0;
+    let sheet: Vec<_> = sheet.into_iter().filter(is_seen).collect();
+    let out = attached(&[torch.clone(), sheet.clone()]);
+    let n_lost = n_of(&out, &sheet, PointKind::Attachment);
+    assert!(n_lost <= 6, "{n_lost} of {}", sheet.len());
+    let n_moving = n_of(&out, &torch, PointKind::Attachment);
+    assert!(5 * n_moving >= 4 * torch.len(), "{n_moving} of {}", torch.len());
+}
+
+#[test]
+fn a_hose_whose_end_is_hidden_moves_and_what_passes_or_stands_beside_the_robot_does_not() {
+    // The nearest voxel is 15 mm from the link.
+    let near = |at: Voxel, way: i32| {
+        let voxel = voxel(at, 1, way.abs());
+        ResidualVoxel { distance: voxel.distance + 0.005, ..voxel }
+    };
+    let hose: Vec<_> = (0..80).map(|k| near([k / 3, k * k / 200, k], k)).collect();
+    let passing: Vec<_> = (-60..80).map(|k| near([k / 3, 0, k], k)).collect();
+    let post: Vec<_> = (0..60).map(|k| near([0, 0, -k], k)).collect();
+    let n_moving = |of: &[ResidualVoxel], n_links: usize| {
+        let (mut of, n) = (of.to_vec(), of.len());
+        let stands = of[n - 1].voxel[2] < 0;
+        for end in &mut of[n - 3..] {
+            (end.at_border, end.grounded) = (!stands, stands);
+        }
+        n_of(&attached_to_one_of(n_links, &[of.clone()]), &of, PointKind::Attachment)
+    };
+    // Beside a hand, and beside another link.
+    for n_links in [2, 4] {
+        assert!(n_moving(&hose, n_links) >= 70, "{} of 80", n_moving(&hose, n_links));
+        assert_eq!([n_moving(&passing, n_links), n_moving(&post, n_links)], [0, 0], "{n_links}");
+    }
+}
+
+#[test]
+fn a_tool_on_a_hose_moves_whole_with_a_bit_beside_the_hose_and_a_clamp_at_its_end() {
+    let mut tool = shell([-3, -3, -10], [3, 3, 0], below);
+    tool.extend(shell([-10, -10, -12], [10, 10, -11], below));
+    let far = |at: Voxel| voxel(at, 1, 99);
+    let border = |at: Voxel| ResidualVoxel { at_border: true, ..far(at) };
+    tool.extend(shell([6, 6, -10], [10, 10, -6], below));
+    // From the plate up to a beam, with a knob: no hose by its shape.
+    let mut line: Vec<_> = (-5..60).map(|z| far([8, 8, z])).collect();
+    line.extend((0..60).map(|z| far([9, 8, z])));
+    let knob = shell([6, 6, -2], [10, 10, -1], far);
+    line.extend(knob.iter().filter(|v| v.voxel[..2] != [8, 8]));
+    let beam = shell([0, 0, 60], [40, 20, 64], border);
+    // From the mount to a clamp.
+    let mut hose: Vec<_> = (4..80).map(|k| far([k, 0, k / 2 - 8])).collect();
+    hose[0] = voxel([4, 0, -6], 1, 0);
+    let clamp = shell([80, -1, 31], [82, 1, 33], |at| match at[0] {
+        82 => border(at),
+        _ => far(at),
+    });
+    for held in [vec![line, beam], vec![hose, clamp]] {
+        let parts: Vec<_> = std::iter::once(tool.clone()).chain(held.clone()).collect();
+        let out = attached(&parts);
+        for (of, least) in [(&tool, 95), (&held[0], 90)] {
+            let n = n_of(&out, of, PointKind::Attachment);
+            assert!(100 * n >= least * of.len(), "{n} of {}", of.len());
+        }
+    }
 }
