@@ -3,9 +3,9 @@
 
 use super::mesh_chunks::VoxelScratch;
 use super::plant_state::PlantState;
-use super::stray_points::StrayPoints;
 use crate::cache::VerifiedFiles;
 use crate::engine::{Engine, Task};
+use clearance::OwnSurface;
 use contract::{PointKind, Result, Space, SpaceKind};
 use export::read_tile;
 use geometry::Aabb;
@@ -41,8 +41,8 @@ pub(super) struct MeshedResult<'a> {
     pub(super) tiles: Vec<String>,
     pub(super) region: Option<Aabb>,
     pub(super) free: FreeSpace,
-    /// Points that are no obstacles.
-    pub(super) strays: StrayPoints,
+    /// What uncertain points may lie on without standing in a robot's way.
+    pub(super) robots: Vec<OwnSurface>,
     pub(super) scratch: PathBuf,
     pub(super) engine: &'a Engine,
 }
@@ -55,7 +55,7 @@ pub(super) struct BoundedMesh {
     pub(super) farthest: f64,
     pub(super) n_points: u64,
     pub(super) n_moving: u64,
-    pub(super) n_strays: u64,
+    pub(super) n_own: u64,
     pub(super) n_fine: usize,
     pub(super) n_boxes: usize,
 }
@@ -65,8 +65,8 @@ pub(super) struct BoundedMesh {
 enum PointPart {
     /// It moves with a robot, and is left out.
     Moves,
-    /// It is no obstacle for `check`, and is left out.
-    Stray,
+    /// It is uncertain and on a moving link of a robot, and is left out: a robot would stand in it.
+    Own,
     /// It is covered.
     Stands,
 }
@@ -75,7 +75,7 @@ enum PointPart {
 struct ReadPoints {
     n: u64,
     n_moving: u64,
-    n_strays: u64,
+    n_own: u64,
     /// Bounds of those that stand still.
     bounds: Aabb,
 }
@@ -139,11 +139,11 @@ impl MeshedResult<'_> {
         let scratch = VoxelScratch::create(&self.scratch)?;
         let counted = self.engine.fan_out("voxels", self.tiles.clone(), |tile| {
             let mut voxels = OccupiedVoxels::new(lattice);
-            let mut own = ReadPoints { n: 0, n_moving: 0, n_strays: 0, bounds: Aabb::EMPTY };
+            let mut own = ReadPoints { n: 0, n_moving: 0, n_own: 0, bounds: Aabb::EMPTY };
             self.each_point(&tile, |world, part| {
                 match part {
                     PointPart::Moves => own.n_moving += 1,
-                    PointPart::Stray => own.n_strays += 1,
+                    PointPart::Own => own.n_own += 1,
                     PointPart::Stands => {
                         own.n += 1;
                         own.bounds.add(world);
@@ -172,7 +172,7 @@ impl MeshedResult<'_> {
             farthest: 0.0,
             n_points: counted.iter().map(|own| own.n).sum(),
             n_moving: counted.iter().map(|own| own.n_moving).sum(),
-            n_strays: counted.iter().map(|own| own.n_strays).sum(),
+            n_own: counted.iter().map(|own| own.n_own).sum(),
             n_fine,
             n_boxes: 0,
         };
@@ -219,6 +219,10 @@ impl MeshedResult<'_> {
         Ok(found)
     }
 
+    fn is_on_robot(&self, world: [f64; 3]) -> bool {
+        self.robots.iter().any(|robot| robot.contains(world))
+    }
+
     /// Passes each point of a tile in the region, and what the mesh makes of it.
     fn each_point(
         &self,
@@ -233,7 +237,7 @@ impl MeshedResult<'_> {
                 if is_inside {
                     let part = match point.label.kind {
                         PointKind::Link | PointKind::Attachment => PointPart::Moves,
-                        kind if self.strays.contains(point.world, kind) => PointPart::Stray,
+                        PointKind::Uncertain if self.is_on_robot(point.world) => PointPart::Own,
                         _ => PointPart::Stands,
                     };
                     take(point.world, part)?;
