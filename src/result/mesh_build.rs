@@ -31,6 +31,9 @@ const NOISE: f64 = 0.005;
 /// Least and largest distance beyond which a point is put into a box, as shares of the bound.
 const HELD: [f64; 2] = [0.5, 0.75];
 
+/// Middle of a chunk of the lattice that is the middle of a voxel, too, in voxels.
+const MIDDLE_OF_CHUNK: f64 = 64.5;
+
 /// Least share of the way from one tried bound to the other that the next one keeps from both.
 const WITHIN: f64 = 0.2;
 
@@ -126,11 +129,14 @@ impl MeshedResult<'_> {
         Ok(found)
     }
 
-    /// The lattice of a bound: its origin is a whole number of metres near the tiles, so that
-    /// places keep their precision in map coordinates.
+    /// The lattice of a bound: its origin is near the tiles, so that places keep their precision in
+    /// map coordinates, and floors at whole metres lie in the middle of a voxel and of a chunk:
+    /// at the face of a voxel their noise would make two layers, and at that of a chunk they would
+    /// be reduced without a look at free space.
     fn lattice(&self, bound: f64) -> VoxelLattice {
-        let origin = self.state.records.las().quantum.offset.map(f64::round);
-        VoxelLattice { origin, edge: EDGE_PER_BOUND * bound }
+        let edge = EDGE_PER_BOUND * bound;
+        let offset = self.state.records.las().quantum.offset;
+        VoxelLattice { origin: offset.map(|v| v.round() - MIDDLE_OF_CHUNK * edge), edge }
     }
 
     /// The mesh that no point leaves by more than the bound.
