@@ -24,12 +24,15 @@ impl OwnSurface {
             let (mesh, bounds) = (&model.links[link].mesh, model.links[link].bounds);
             Some((link, bounds, PartShape::surface(mesh, &bounds, SURFACE_REACH)?))
         };
-        let links: Vec<_> = (0..moves.len()).filter(|link| moves[*link]).filter_map(shape).collect();
+        let links: Vec<_> =
+            (0..moves.len()).filter(|link| moves[*link]).filter_map(shape).collect();
         let mut bounds = Aabb::EMPTY;
         for poses in postures {
             for (link, own, _) in &links {
                 let wide = own.grown(f64::from(SURFACE_REACH));
-                wide.corners().into_iter().for_each(|c| bounds.add((poses[*link] * Point::from(c)).into()));
+                wide.corners()
+                    .into_iter()
+                    .for_each(|c| bounds.add((poses[*link] * Point::from(c)).into()));
             }
         }
         let inverse = |poses: &Vec<Pose>| poses.iter().map(Pose::inverse).collect();
