@@ -115,6 +115,8 @@ def main():
     parser.add_argument("--validator", type=Path, help="folder in which npm installed gltf-validator")
     parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "stillpoint-scenes")
     given = parser.parse_args()
+    # The validator runs in a folder of its own.
+    given.work, given.demo = given.work.resolve(), given.demo and given.demo.resolve()
     given.work.mkdir(parents=True, exist_ok=True)
     python = environment(given.work)
     rows = []

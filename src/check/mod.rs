@@ -7,7 +7,7 @@
 
 mod outlines;
 mod report;
-mod strays;
+mod robot_surfaces;
 mod subject;
 mod surrounded;
 mod surroundings;
@@ -15,7 +15,7 @@ pub mod trajectory;
 mod words;
 
 pub use report::{CheckRequest, PathDoubt, PathOutcome, PathReport};
-pub(crate) use strays::stray_points;
+pub(crate) use robot_surfaces::robot_surfaces;
 pub use words::{json, words};
 
 use crate::cache::VerifiedFiles;

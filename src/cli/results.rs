@@ -15,11 +15,10 @@ use crate::result::changes::{changes, words};
 use crate::result::conversion::{ExportFormat, convert};
 use crate::result::history;
 use crate::result::mesh_build::BOUNDS;
-use crate::result::mesh_export::{MeshFormat, MeshRequest, export_mesh};
+use crate::result::mesh_export::{MeshFormat, MeshRequest, Published, export_mesh};
 use crate::result::page::{page_data, write_page, write_page_with_run};
 use crate::result::scans_back::{ScansBack, give_scans_back};
 use crate::result::scene_export::{SceneFormat, SceneRequest, export_scene};
-use crate::result::stray_points::Published;
 use crate::result::text_report::text_report;
 use crate::{cache, check};
 use contract::words::count;
@@ -121,11 +120,10 @@ pub(super) fn export(flags: &ExportFlags, common: &Common, say: &Say) -> Result<
             written
         }
         None if flags.to == ExportFormat::Mesh => {
-            let (only, library) = (flags.mesh.robot.as_deref(), flags.robots.as_deref());
-            let find_strays = |published: Published<'_>| {
-                check::stray_points(&flags.out, published, only, library, &means, &engine)
+            let find_robots = |published: Published<'_>| {
+                check::robot_surfaces(published, flags.robots.as_deref(), &means, &engine)
             };
-            let mesh = export_mesh(&mesh_request(flags)?, find_strays, &engine)?;
+            let mesh = export_mesh(&mesh_request(flags)?, find_robots, &engine)?;
             mesh.warnings.iter().for_each(|warning| say.warning(warning));
             words = mesh.words;
             mesh.paths

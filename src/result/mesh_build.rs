@@ -3,9 +3,9 @@
 
 use super::mesh_chunks::VoxelScratch;
 use super::plant_state::PlantState;
-use super::stray_points::StrayPoints;
 use crate::cache::VerifiedFiles;
 use crate::engine::{Engine, Task};
+use clearance::OwnSurface;
 use contract::{PointKind, Result, Space, SpaceKind};
 use export::read_tile;
 use geometry::Aabb;
@@ -31,6 +31,9 @@ const NOISE: f64 = 0.005;
 /// Least and largest distance beyond which a point is put into a box, as shares of the bound.
 const HELD: [f64; 2] = [0.5, 0.75];
 
+/// Middle of a chunk of the lattice that is the middle of a voxel, too, in voxels.
+const MIDDLE_OF_CHUNK: f64 = 64.5;
+
 /// Least share of the way from one tried bound to the other that the next one keeps from both.
 const WITHIN: f64 = 0.2;
 
@@ -41,8 +44,8 @@ pub(super) struct MeshedResult<'a> {
     pub(super) tiles: Vec<String>,
     pub(super) region: Option<Aabb>,
     pub(super) free: FreeSpace,
-    /// Points that are no obstacles.
-    pub(super) strays: StrayPoints,
+    /// What uncertain points may lie on without standing in a robot's way.
+    pub(super) robots: Vec<OwnSurface>,
     pub(super) scratch: PathBuf,
     pub(super) engine: &'a Engine,
 }
@@ -55,7 +58,7 @@ pub(super) struct BoundedMesh {
     pub(super) farthest: f64,
     pub(super) n_points: u64,
     pub(super) n_moving: u64,
-    pub(super) n_strays: u64,
+    pub(super) n_own: u64,
     pub(super) n_fine: usize,
     pub(super) n_boxes: usize,
 }
@@ -65,8 +68,8 @@ pub(super) struct BoundedMesh {
 enum PointPart {
     /// It moves with a robot, and is left out.
     Moves,
-    /// It is no obstacle for `check`, and is left out.
-    Stray,
+    /// It is uncertain and on a moving link of a robot, and is left out: a robot would stand in it.
+    Own,
     /// It is covered.
     Stands,
 }
@@ -75,7 +78,7 @@ enum PointPart {
 struct ReadPoints {
     n: u64,
     n_moving: u64,
-    n_strays: u64,
+    n_own: u64,
     /// Bounds of those that stand still.
     bounds: Aabb,
 }
@@ -126,11 +129,14 @@ impl MeshedResult<'_> {
         Ok(found)
     }
 
-    /// The lattice of a bound: its origin is a whole number of metres near the tiles, so that
-    /// places keep their precision in map coordinates.
+    /// The lattice of a bound: its origin is near the tiles, so that places keep their precision in
+    /// map coordinates, and floors at whole metres lie in the middle of a voxel and of a chunk:
+    /// at the face of a voxel their noise would make two layers, and at that of a chunk they would
+    /// be reduced without a look at free space.
     fn lattice(&self, bound: f64) -> VoxelLattice {
-        let origin = self.state.records.las().quantum.offset.map(f64::round);
-        VoxelLattice { origin, edge: EDGE_PER_BOUND * bound }
+        let edge = EDGE_PER_BOUND * bound;
+        let offset = self.state.records.las().quantum.offset;
+        VoxelLattice { origin: offset.map(|v| v.round() - MIDDLE_OF_CHUNK * edge), edge }
     }
 
     /// The mesh that no point leaves by more than the bound.
@@ -139,11 +145,11 @@ impl MeshedResult<'_> {
         let scratch = VoxelScratch::create(&self.scratch)?;
         let counted = self.engine.fan_out("voxels", self.tiles.clone(), |tile| {
             let mut voxels = OccupiedVoxels::new(lattice);
-            let mut own = ReadPoints { n: 0, n_moving: 0, n_strays: 0, bounds: Aabb::EMPTY };
+            let mut own = ReadPoints { n: 0, n_moving: 0, n_own: 0, bounds: Aabb::EMPTY };
             self.each_point(&tile, |world, part| {
                 match part {
                     PointPart::Moves => own.n_moving += 1,
-                    PointPart::Stray => own.n_strays += 1,
+                    PointPart::Own => own.n_own += 1,
                     PointPart::Stands => {
                         own.n += 1;
                         own.bounds.add(world);
@@ -172,7 +178,7 @@ impl MeshedResult<'_> {
             farthest: 0.0,
             n_points: counted.iter().map(|own| own.n).sum(),
             n_moving: counted.iter().map(|own| own.n_moving).sum(),
-            n_strays: counted.iter().map(|own| own.n_strays).sum(),
+            n_own: counted.iter().map(|own| own.n_own).sum(),
             n_fine,
             n_boxes: 0,
         };
@@ -219,6 +225,10 @@ impl MeshedResult<'_> {
         Ok(found)
     }
 
+    fn is_on_robot(&self, world: [f64; 3]) -> bool {
+        self.robots.iter().any(|robot| robot.contains(world))
+    }
+
     /// Passes each point of a tile in the region, and what the mesh makes of it.
     fn each_point(
         &self,
@@ -233,7 +243,7 @@ impl MeshedResult<'_> {
                 if is_inside {
                     let part = match point.label.kind {
                         PointKind::Link | PointKind::Attachment => PointPart::Moves,
-                        kind if self.strays.contains(point.world, kind) => PointPart::Stray,
+                        PointKind::Uncertain if self.is_on_robot(point.world) => PointPart::Own,
                         _ => PointPart::Stands,
                     };
                     take(point.world, part)?;

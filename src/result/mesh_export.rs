@@ -10,11 +10,11 @@
 
 use super::mesh_build::{BoundedMesh, MeshedResult, convex, unknown};
 use super::plant_state::PlantState;
-use super::stray_points::{Published, StrayPoints};
 use crate::cache::{EXPORT, VerifiedFiles, tiles_of};
 use crate::engine::Engine;
 use crate::io::own_paths::without_links;
 use crate::job::Job;
+use clearance::OwnSurface;
 use contract::{Error, Kind, Result, Space};
 use export::ResultFile;
 use geometry::Aabb;
@@ -85,6 +85,14 @@ impl MeshFormat {
     }
 }
 
+/// A published result.
+#[derive(Clone, Copy)]
+pub(crate) struct Published<'a> {
+    pub(crate) files: &'a VerifiedFiles,
+    pub(crate) result: &'a ResultFile,
+    pub(crate) state: &'a PlantState,
+}
+
 /// What was written.
 #[derive(Debug)]
 pub(crate) struct MeshOutcome {
@@ -96,14 +104,14 @@ pub(crate) struct MeshOutcome {
     pub warnings: Vec<String>,
 }
 
-/// Writes the mesh, without the stray points that `find_strays` finds; with all points where these
-/// cannot be found, as without the models of the robots.
+/// Writes the mesh, without uncertain points on the surfaces of robots, which `find_robots` finds;
+/// with these where robots cannot be placed, as without their models.
 ///
 /// # Errors
 /// There is no result, it has no tiles or no such robot, or files cannot be read or written.
 pub(crate) fn export_mesh(
     request: &MeshRequest,
-    find_strays: impl FnOnce(Published<'_>) -> Result<StrayPoints>,
+    find_robots: impl FnOnce(Published<'_>) -> Result<Vec<OwnSurface>>,
     engine: &Engine,
 ) -> Result<MeshOutcome> {
     let out = &request.out;
@@ -118,10 +126,10 @@ pub(crate) fn export_mesh(
     let folder = format!("{EXPORT}/mesh");
     let scratch = without_links(out, &format!("{folder}/scratch"))?;
     let mut warnings = Vec::new();
-    let strays = find_strays(Published { files: &files, result: &result, state: &state });
-    let strays = strays.unwrap_or_else(|error| none_found(&error, &mut warnings));
+    let robots = find_robots(Published { files: &files, result: &result, state: &state });
+    let robots = robots.unwrap_or_else(|error| none_placed(&error, &mut warnings));
     let meshed =
-        MeshedResult { files: &files, state: &state, tiles, region, free, strays, scratch, engine };
+        MeshedResult { files: &files, state: &state, tiles, region, free, robots, scratch, engine };
     let found = meshed.within(request.bound, request.triangles, &mut warnings)?;
     let place = |name: String| without_links(out, &format!("{folder}/{name}"));
     let ending = request.format.ending();
@@ -161,10 +169,10 @@ pub(crate) fn export_mesh(
     Ok(MeshOutcome { paths, words, warnings })
 }
 
-/// No stray points, and why.
-fn none_found(error: &Error, warnings: &mut Vec<String>) -> StrayPoints {
-    warnings.push(format!("stray points near robots are kept in the mesh: {error}"));
-    StrayPoints::default()
+/// No surfaces of robots, and why.
+fn none_placed(error: &Error, warnings: &mut Vec<String>) -> Vec<OwnSurface> {
+    warnings.push(format!("uncertain points on robots are kept in the mesh: {error}"));
+    Vec::new()
 }
 
 /// Known space of all robots, and the bounds of that of the requested one.
@@ -245,7 +253,7 @@ fn report(
         "region": meshed.region.map(|region| [region.min, region.max]),
         "left_out": {
             "points_of_robots_and_attachments": found.n_moving,
-            "stray_points": found.n_strays,
+            "uncertain_points_on_robots": found.n_own,
         },
     })
 }

@@ -20,5 +20,4 @@ pub(crate) mod report;
 pub mod run_record;
 pub mod scans_back;
 pub mod scene_export;
-pub(crate) mod stray_points;
 pub(crate) mod text_report;

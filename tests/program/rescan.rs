@@ -202,8 +202,8 @@ fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Val
         let report = std::fs::read_to_string(folder.join("mesh.json")).expect("a report");
         let report: serde_json::Value = serde_json::from_str(&report).expect("it parses");
         let n = |which: &str| report.pointer(which).and_then(serde_json::Value::as_u64);
-        let strays = n("/left_out/stray_points").expect("a number");
-        (inside, n("/points").expect("a number") + strays)
+        let own = n("/left_out/uncertain_points_on_robots").expect("a number");
+        (inside, n("/points").expect("a number") + own)
     };
     let (before, _) = meshed("base");
     let (after, n_meshed) = meshed("again");

@@ -28,7 +28,7 @@ const BESIDE_REACH: f32 = 0.1;
 /// Distance from a link's surface as scanned within which a point belongs to the link, metres.
 /// Labels of links reach 6 to 12 mm. The points of an object that touches the robot remain beyond
 /// this distance.
-const SURFACE_REACH: f32 = 0.008;
+pub(crate) const SURFACE_REACH: f32 = 0.008;
 
 /// Distance from the robot as scanned within which unseen space is a gap between its parts or
 /// behind them, metres; an object that stands there would reach farther.
@@ -332,7 +332,7 @@ fn farthest(bounds: &Aabb) -> f64 {
     bounds.corners().into_iter().map(|c| Point::from(c).coords.norm()).fold(0.0, f64::max)
 }
 
-fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {
+pub(crate) fn is_near(bounds: &Aabb, p: [f32; 3], within: f32) -> bool {
     let outside = |i: usize| {
         let v = f64::from(p[i]);
         (bounds.min[i] - v).max(v - bounds.max[i]).max(0.0)

@@ -5,7 +5,7 @@ use crate::evidence::Sight;
 use crate::front::Front;
 use crate::obstacle::{CELL, HALF_CELL, Obstacle, ObstacleKind};
 use crate::shadow::ScannerAt;
-use geometry::{Aabb, Point};
+use geometry::Point;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -26,38 +26,6 @@ pub struct Cells {
     fronts: BTreeMap<u16, Front>,
     /// These scanners.
     pub(crate) eyes: Vec<ScannerAt>,
-}
-
-/// Cells around a robot whose points are no evidence of an object, see
-/// [`crate::Obstacles::strays`].
-#[derive(Debug, Clone)]
-pub struct StrayCells {
-    far: f64,
-    /// Ascending.
-    cells: Vec<(u64, ObstacleKind)>,
-}
-
-impl StrayCells {
-    /// Of these cells, up to `far` metres from the base along each axis.
-    pub(crate) fn new(far: f64, mut cells: Vec<(u64, ObstacleKind)>) -> Self {
-        cells.sort_unstable();
-        cells.dedup();
-        Self { far, cells }
-    }
-
-    /// Whether a point (base frame, metres) of this kind is no evidence of an object; `None` beyond
-    /// the distance up to which points were looked at.
-    #[must_use]
-    pub fn contains(&self, p: [f64; 3], what: ObstacleKind) -> Option<bool> {
-        let is_inside = p.iter().all(|v| v.abs() <= self.far);
-        is_inside.then(|| self.cells.binary_search(&(key(p, self.far), what)).is_ok())
-    }
-
-    /// Where points were looked at; base frame, metres.
-    #[must_use]
-    pub fn bounds(&self) -> Aabb {
-        Aabb { min: [-self.far; 3], max: [self.far; 3] }
-    }
 }
 
 /// Key of the cell of a place in the base's frame, at most `far` metres away along each axis.

@@ -1,7 +1,7 @@
 //! Obstacles around a robot: balls that contain the points of a cell, sorted into bins. All
 //! coordinates are in the frame of the robot's base, metres.
 
-use crate::cells::{CellSight, Cells, PointCell, StrayCells, key, middle};
+use crate::cells::{CellSight, Cells, PointCell, key, middle};
 use crate::evidence::{SeenSpace, evident};
 use crate::obstacle::{HALF_DIAGONAL, Obstacle, ObstacleKind, distance};
 use crate::shadow::ScannerAt;
@@ -143,12 +143,6 @@ impl Obstacles {
         }
         self.all = all;
         self.sort();
-    }
-
-    /// Cells of points that are no obstacles, since they are no evidence of an object.
-    #[must_use]
-    pub fn strays(&self) -> StrayCells {
-        StrayCells::new(self.far, self.strays.clone())
     }
 
     /// All cells of points that stand still or may do so, whether obstacles or dropped.
