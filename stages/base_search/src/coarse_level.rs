@@ -198,22 +198,7 @@ impl BaseSearch<'_> {
                 count[j as usize * n[0] + i as usize] += cube.n_points;
             }
         }
-        // The scans show no points in the middle of a base, so that points around it are counted.
-        let r = ((self.radius * SURROUND_SHARE) / step).ceil() as isize;
-        let disc: Vec<(isize, isize)> = (-r..=r)
-            .flat_map(|dj| (-r..=r).map(move |di| (di, dj)))
-            .filter(|(di, dj)| di * di + dj * dj <= r * r)
-            .collect();
-        let mut near = vec![0_usize; count.len()];
-        for (at, _) in count.iter().enumerate().filter(|(_, n)| **n >= MIN_IN_CELL) {
-            let (i, j) = ((at % n[0]) as isize, (at / n[0]) as isize);
-            for (di, dj) in &disc {
-                let (a, b) = (i + di, j + dj);
-                if a >= 0 && b >= 0 && (a as usize) < n[0] && (b as usize) < n[1] {
-                    near[b as usize * n[0] + a as usize] += 1;
-                }
-            }
-        }
+        let near = filled_around(&count, n, self.radius * SURROUND_SHARE / step);
         let place = |at: usize| {
             let [u, v] = [at % n[0], at / n[0]].map(|i| i as f64 * step);
             let at = turn * Vector::new(low[0] + u, low[1] + v, 0.0);
@@ -221,6 +206,27 @@ impl BaseSearch<'_> {
         };
         near.iter().enumerate().filter(|(_, n)| **n >= MIN_CELLS).map(|(at, _)| place(at)).collect()
     }
+}
+
+/// For each cell of a plane the number of filled cells within a radius, in cells. The scans show no
+/// points in the middle of a base, so that points around it are counted.
+fn filled_around(count: &[u32], n: [usize; 2], radius: f64) -> Vec<usize> {
+    let r = radius.ceil() as isize;
+    let disc: Vec<(isize, isize)> = (-r..=r)
+        .flat_map(|dj| (-r..=r).map(move |di| (di, dj)))
+        .filter(|(di, dj)| di * di + dj * dj <= r * r)
+        .collect();
+    let mut near = vec![0_usize; count.len()];
+    for (at, _) in count.iter().enumerate().filter(|(_, n)| **n >= MIN_IN_CELL) {
+        let (i, j) = ((at % n[0]) as isize, (at / n[0]) as isize);
+        for (di, dj) in &disc {
+            let (a, b) = (i + di, j + dj);
+            if a >= 0 && b >= 0 && (a as usize) < n[0] && (b as usize) < n[1] {
+                near[b as usize * n[0] + a as usize] += 1;
+            }
+        }
+    }
+    near
 }
 
 /// The axis along which rows of places on a plane lie.
