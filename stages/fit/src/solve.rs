@@ -197,7 +197,7 @@ fn is_promising(problem: &Problem<'_>, bases: &[Pose]) -> bool {
     if is_scanned {
         let score = |problem: &Problem<'_>, h: &Hypothesis| judged(problem, h).score;
         let glance = look(problem, bases, &GLANCE, score).unwrap_or(f64::NEG_INFINITY);
-        if glance < HOPELESS_GLANCE || glance >= CLEAR_LOOK {
+        if !(HOPELESS_GLANCE..CLEAR_LOOK).contains(&glance) {
             return glance >= CLEAR_LOOK;
         }
     }
