@@ -4,9 +4,6 @@
 //! The search does not need clean clusters. It scores base poses by the free-space evidence of the
 //! scans' beams (METHOD.md §5–§7). Its results are [`contract::Candidate`]s, which are refined by
 //! the fit.
-//!
-//! The search needs no clean cluster: it asks the beams, on the planes that something may stand on
-//! (METHOD.md §5–§7).
 #![forbid(unsafe_code)]
 
 mod body_boxes;
