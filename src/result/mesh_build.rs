@@ -1,9 +1,10 @@
 //! Makes the mesh of a published result: tiles into voxels, chunks into surfaces, which are joined
 //! and measured against all points.
 
+use super::loose_points::{BesideRobots, LooseCells};
 use super::mesh_chunks::VoxelScratch;
 use super::plant_state::PlantState;
-use crate::cache::VerifiedFiles;
+use crate::cache::{VerifiedFiles, tiles_of};
 use crate::engine::{Engine, Task};
 use clearance::OwnSurface;
 use contract::{PointKind, Result, Space, SpaceKind};
@@ -46,6 +47,8 @@ pub(super) struct MeshedResult<'a> {
     pub(super) free: FreeSpace,
     /// What uncertain points may lie on without standing in a robot's way.
     pub(super) robots: Vec<OwnSurface>,
+    /// Where they hang in the air beside a robot.
+    pub(super) loose: LooseCells,
     pub(super) scratch: PathBuf,
     pub(super) engine: &'a Engine,
 }
@@ -59,6 +62,7 @@ pub(super) struct BoundedMesh {
     pub(super) n_points: u64,
     pub(super) n_moving: u64,
     pub(super) n_own: u64,
+    pub(super) n_loose: u64,
     pub(super) n_fine: usize,
     pub(super) n_boxes: usize,
 }
@@ -70,15 +74,19 @@ enum PointPart {
     Moves,
     /// It is uncertain and on a moving link of a robot, and is left out: a robot would stand in it.
     Own,
+    /// It is uncertain and hangs in the air beside a robot, and is left out.
+    Loose,
     /// It is covered.
     Stands,
 }
 
 /// Points of a tile that are read.
+#[derive(Default)]
 struct ReadPoints {
     n: u64,
     n_moving: u64,
     n_own: u64,
+    n_loose: u64,
     /// Bounds of those that stand still.
     bounds: Aabb,
 }
@@ -145,11 +153,12 @@ impl MeshedResult<'_> {
         let scratch = VoxelScratch::create(&self.scratch)?;
         let counted = self.engine.fan_out("voxels", self.tiles.clone(), |tile| {
             let mut voxels = OccupiedVoxels::new(lattice);
-            let mut own = ReadPoints { n: 0, n_moving: 0, n_own: 0, bounds: Aabb::EMPTY };
+            let mut own = ReadPoints::default();
             self.each_point(&tile, |world, part| {
                 match part {
                     PointPart::Moves => own.n_moving += 1,
                     PointPart::Own => own.n_own += 1,
+                    PointPart::Loose => own.n_loose += 1,
                     PointPart::Stands => {
                         own.n += 1;
                         own.bounds.add(world);
@@ -179,6 +188,7 @@ impl MeshedResult<'_> {
             n_points: counted.iter().map(|own| own.n).sum(),
             n_moving: counted.iter().map(|own| own.n_moving).sum(),
             n_own: counted.iter().map(|own| own.n_own).sum(),
+            n_loose: counted.iter().map(|own| own.n_loose).sum(),
             n_fine,
             n_boxes: 0,
         };
@@ -229,11 +239,55 @@ impl MeshedResult<'_> {
         self.robots.iter().any(|robot| robot.contains(world))
     }
 
+    /// The same result, with what hangs in the air beside its robots known.
+    pub(super) fn without_loose(mut self) -> Result<Self> {
+        let near: Vec<Aabb> = self.robots.iter().map(|r| r.bounds().grown(1.0)).collect();
+        let tiles = match self.state.records.tile_edge() {
+            Some(edge) => {
+                let touched =
+                    tiles_of(&self.files.manifest().files, edge, &near.iter().collect::<Vec<_>>());
+                self.tiles.iter().filter(|t| touched.contains(t)).cloned().collect()
+            }
+            None => self.tiles.clone(),
+        };
+        let found = self.engine.fan_out("beside robots", tiles, |tile| {
+            let mut beside = BesideRobots::default();
+            self.read(&tile, |world, kind| {
+                if !matches!(kind, PointKind::Link | PointKind::Attachment) {
+                    beside.add(world, kind, &self.robots);
+                }
+                Ok(())
+            })?;
+            Ok(beside)
+        })?;
+        let mut all = BesideRobots::default();
+        found.into_iter().for_each(|beside| all.join(beside));
+        self.loose = all.loose();
+        Ok(self)
+    }
+
     /// Passes each point of a tile in the region, and what the mesh makes of it.
     fn each_point(
         &self,
         tile: &str,
         mut take: impl FnMut([f64; 3], PointPart) -> Result<()>,
+    ) -> Result<()> {
+        self.read(tile, |world, kind| {
+            let part = match kind {
+                PointKind::Link | PointKind::Attachment => PointPart::Moves,
+                PointKind::Uncertain if self.is_on_robot(world) => PointPart::Own,
+                PointKind::Uncertain if self.loose.contains(world) => PointPart::Loose,
+                _ => PointPart::Stands,
+            };
+            take(world, part)
+        })
+    }
+
+    /// Passes each point of a tile in the region, and its kind.
+    fn read(
+        &self,
+        tile: &str,
+        mut take: impl FnMut([f64; 3], PointKind) -> Result<()>,
     ) -> Result<()> {
         let (path, stated) = self.files.stated(tile)?;
         read_tile(&path, &self.state.records.las(), stated, |points| {
@@ -241,12 +295,7 @@ impl MeshedResult<'_> {
             for point in points {
                 let is_inside = self.region.is_none_or(|region| region.contains(point.world));
                 if is_inside {
-                    let part = match point.label.kind {
-                        PointKind::Link | PointKind::Attachment => PointPart::Moves,
-                        PointKind::Uncertain if self.is_on_robot(point.world) => PointPart::Own,
-                        _ => PointPart::Stands,
-                    };
-                    take(point.world, part)?;
+                    take(point.world, point.label.kind)?;
                 }
             }
             Ok(())

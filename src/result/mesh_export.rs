@@ -8,6 +8,7 @@
 //! mesh.json     the bound, what was measured, what was left out
 //! ```
 
+use super::loose_points::LooseCells;
 use super::mesh_build::{BoundedMesh, MeshedResult, convex, unknown};
 use super::plant_state::PlantState;
 use crate::cache::{EXPORT, VerifiedFiles, tiles_of};
@@ -104,8 +105,8 @@ pub(crate) struct MeshOutcome {
     pub warnings: Vec<String>,
 }
 
-/// Writes the mesh, without uncertain points on the surfaces of robots, which `find_robots` finds;
-/// with these where robots cannot be placed, as without their models.
+/// Writes the mesh, without uncertain points on the surfaces of robots, which `find_robots` finds,
+/// and in the air beside them; with these where robots cannot be placed, as without their models.
 ///
 /// # Errors
 /// There is no result, it has no tiles or no such robot, or files cannot be read or written.
@@ -128,8 +129,9 @@ pub(crate) fn export_mesh(
     let mut warnings = Vec::new();
     let robots = find_robots(Published { files: &files, result: &result, state: &state });
     let robots = robots.unwrap_or_else(|error| none_placed(&error, &mut warnings));
-    let meshed =
-        MeshedResult { files: &files, state: &state, tiles, region, free, robots, scratch, engine };
+    let (files, state, loose) = (&files, &state, LooseCells::default());
+    let meshed = MeshedResult { files, state, tiles, region, free, robots, loose, scratch, engine };
+    let meshed = meshed.without_loose()?;
     let found = meshed.within(request.bound, request.triangles, &mut warnings)?;
     let place = |name: String| without_links(out, &format!("{folder}/{name}"));
     let ending = request.format.ending();
@@ -171,7 +173,7 @@ pub(crate) fn export_mesh(
 
 /// No surfaces of robots, and why.
 fn none_placed(error: &Error, warnings: &mut Vec<String>) -> Vec<OwnSurface> {
-    warnings.push(format!("uncertain points on robots are kept in the mesh: {error}"));
+    warnings.push(format!("uncertain points on and beside robots are kept in the mesh: {error}"));
     Vec::new()
 }
 
@@ -254,6 +256,7 @@ fn report(
         "left_out": {
             "points_of_robots_and_attachments": found.n_moving,
             "uncertain_points_on_robots": found.n_own,
+            "uncertain_points_in_the_air_beside_robots": found.n_loose,
         },
     })
 }

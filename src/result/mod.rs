@@ -9,6 +9,7 @@ pub(crate) mod copc;
 pub mod distance_export;
 pub mod history;
 pub mod labelled_points;
+mod loose_points;
 pub(crate) mod mesh_build;
 mod mesh_chunks;
 pub mod mesh_export;

@@ -136,14 +136,18 @@ fn what_points_block_the_mesh_blocks() {
     let share = free.as_f64().expect("known") / all.as_f64().expect("an area");
     assert!(share < 0.005, "{report}");
 
-    // All points that are not of a robot are in the mesh, but for uncertain ones on its surface.
-    // These are known by the robots' models: without those they stay.
+    // All points that are not of a robot are in the mesh, but for uncertain ones on its surface and
+    // in the air beside it. These are known by the robots' models: without those they stay.
     let (_, kept) = mesh(dir, &["--robots", "nowhere"]);
     let n = |report: &Value, which: &str| report.pointer(which).and_then(Value::as_u64);
-    let which = "/left_out/uncertain_points_on_robots";
-    let own = n(&report, which);
-    assert!(own > Some(0) && n(&kept, which) == Some(0), "{report}");
-    assert_eq!(n(&report, "/points").zip(own).map(|(a, b)| a + b), n(&kept, "/points"));
+    let mut all = n(&report, "/points");
+    for kind in ["on_robots", "in_the_air_beside_robots"] {
+        let which = format!("/left_out/uncertain_points_{kind}");
+        let own = n(&report, &which);
+        assert!(own.is_some() && n(&kept, &which) == Some(0), "{report}");
+        all = all.zip(own).map(|(a, b)| a + b);
+    }
+    assert!(all == n(&kept, "/points") && all > n(&report, "/points"), "{report}");
 
     // Also the fixed points that `check` doubts: wires and edges are among them.
     let surface = of_ply(&bytes);

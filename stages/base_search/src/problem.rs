@@ -7,7 +7,7 @@ use robot::Model;
 
 use crate::first_link::FirstLink;
 use crate::region_evidence::RegionEvidence;
-use crate::settings::{Settings, THOROUGH, THRIFTY, Thrift};
+use crate::settings::{GUESSING, Settings, THOROUGH, THRIFTY, Thrift};
 use crate::trial::{BaseTrial, SampleScore, Samples, base_link};
 
 /// The search for one model's base in one region.
@@ -87,7 +87,7 @@ impl<'a> BaseSearch<'a> {
     /// coarse level.
     #[must_use]
     pub fn on_guessed_planes(self) -> Self {
-        Self { is_guess: true, ..self }
+        Self { is_guess: true, thrift: GUESSING, ..self }
     }
 
     /// The same search with `breadth` times as many base poses at each level.

@@ -29,8 +29,7 @@ impl OwnSurface {
         let mut bounds = Aabb::EMPTY;
         for poses in postures {
             for (link, own, _) in &links {
-                let wide = own.grown(f64::from(SURFACE_REACH));
-                wide.corners()
+                own.corners()
                     .into_iter()
                     .for_each(|c| bounds.add((poses[*link] * Point::from(c)).into()));
             }
@@ -39,15 +38,29 @@ impl OwnSurface {
         Self { links, postures: postures.iter().map(inverse).collect(), bounds }
     }
 
+    /// Bounds of the links in all postures, world frame, metres; empty without a moving link.
+    #[must_use]
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
     /// Whether a place (world frame, metres) lies on or in a link in one of the postures.
     #[must_use]
     pub fn contains(&self, world: [f64; 3]) -> bool {
-        self.bounds.contains(world)
+        self.is_near(world, f64::from(SURFACE_REACH))
+    }
+
+    /// Whether a place lies within a distance of a link, or in it, in one of the postures (world
+    /// frame, metres).
+    #[must_use]
+    pub fn is_near(&self, world: [f64; 3], within: f64) -> bool {
+        let reach = within as f32;
+        self.bounds.grown(within).contains(world)
             && self.postures.iter().any(|link_from_world| {
                 self.links.iter().any(|(link, bounds, shape)| {
                     let p = link_from_world[*link] * Point::from(world);
                     let p = p.coords.map(|v| v as f32).into();
-                    is_near(bounds, p, SURFACE_REACH) && shape.gap(p, SURFACE_REACH) != Gap::Far
+                    is_near(bounds, p, reach) && shape.gap(p, reach) != Gap::Far
                 })
             })
     }
@@ -100,5 +113,7 @@ mod tests {
             let world = (Vector::from(at) + by).into();
             assert_eq!([one.contains(world), both.contains(world)], [in_one, in_both], "{at:?}");
         }
+        let beside = (Vector::from([0.15, 0.0, 0.6]) + by).into();
+        assert_eq!([0.04, 0.06].map(|within| one.is_near(beside, within)), [false, true]);
     }
 }
