@@ -3,6 +3,7 @@
 
     scripts/cross/paths_in_mujoco.py --program target/release/stillpoint OUT...
                                      [--paths 100] [--seed 1] [--bound 0.02] [--csv FILE]
+                                     [--truth SCANS...]
 
 Robots are those of `export --to mjcf`; what stands still is the convex pieces of
 `export --to mesh --convex`, which replace the scene's boxes and floor. Paths begin in the posture
@@ -23,8 +24,11 @@ cause is one of these, or the path is a fault:
               own and move with it, and the mesh has them as fixed
     touching  all links that hit something touch a piece as found, and pairs that do are left out
     beside    what it hits are not fixed points, but uncertain ones or another robot
+    own       the point there is one of a robot by the truth, which masks missed: `check` has proof
+              that it is a stray, and the mesh keeps it. Told with `--truth` only: for each OUT the
+              folder of its drawn scans, with scans.e57 and truth/
 
-Needs mujoco, open3d, scipy and numpy.
+Needs mujoco, open3d, scipy and numpy; with `--truth` pye57, too.
 """
 
 import argparse
@@ -57,6 +61,8 @@ LOOKED = 0.035
 DEEPER = 0.001
 # Mean distance between places on a link that are compared with a piece, metres.
 SPACING = 0.003
+# Distance up to which points are the same, for registration may move scans, metres.
+SAME = 0.003
 # LAS classes of points of robots and of what hangs on them.
 MOVING = (65, 66)
 # Those of the floor and of what is known to stand still.
@@ -186,7 +192,8 @@ class Plant:
         near = (place - self.middle).astype(np.float32)[None]
         from_mesh = float(self.mesh.compute_distance(near).numpy()[0])
         off, at = points[0].query(place)
-        return float(off), from_mesh, int(points[1][at])
+        is_own = points[3] is not None and points[3].query(points[0].data[at])[0] < SAME
+        return float(off), from_mesh, int(points[1][at]), is_own
 
     def from_points(self, said, at, start, goal, own, points):
         """The least distance of a link's own triangles from fixed points and the floor, in the
@@ -293,6 +300,8 @@ def cause(said, nearest, links, touching, from_points):
             return "hull"
         if any(c["link"] == links["link"] and c["as_found"] for c in said["contacts"]):
             return "as found"
+        if links["from"] and links["from"][3]:
+            return "own"
         return "margin" if links["from"] and links["from"][0] >= MARGIN else "fault"
     _, standing = hits(said)
     if not standing:
@@ -369,6 +378,17 @@ def paths(args, out, robot, wanted, draw, points, figures):
     print(f"{out} {robot['id']}: {len(taken)} taken of {counts}", file=sys.stderr)
 
 
+def true_moving(folder):
+    """Points of robots and of what hangs on them by the truth, world frame, metres."""
+    from mesh_cells import scans
+
+    parts = []
+    for k, (at, is_there) in enumerate(scans(folder)):
+        kind = np.load(folder / f"truth/labels/{k}.kind.npy")
+        parts.append(at[is_there][(kind == 1) | (kind == 2)])
+    return np.concatenate(parts)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--program", type=Path, required=True)
@@ -377,7 +397,9 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--bound", type=float, default=0.02)
     parser.add_argument("--csv", type=argparse.FileType("w"), default=sys.stdout)
+    parser.add_argument("--truth", type=Path, nargs="+", default=[])
     args = parser.parse_args()
+    truths = dict(zip(map(Path.resolve, args.out), args.truth))
     args.program = args.program.resolve()
     draw = np.random.default_rng(args.seed)
     figures = Figures(args.csv)
@@ -391,7 +413,8 @@ def main():
             tiles = [read_las(path) for path in sorted((out / "tiles").glob("*.las"))]
             stands = [~np.isin(kinds, MOVING) for _, kinds in tiles]
             xyz, kinds = (np.concatenate([t[i][own] for t, own in zip(tiles, stands)]) for i in (0, 1))
-            points = cKDTree(xyz), kinds, cKDTree(xyz[np.isin(kinds, STANDING)])
+            moving = cKDTree(true_moving(truths[out])) if out in truths else None
+            points = cKDTree(xyz), kinds, cKDTree(xyz[np.isin(kinds, STANDING)]), moving
         paths(args, out, robot, -(-args.paths // len(robots)), draw, points, figures)
 
 

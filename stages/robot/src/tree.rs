@@ -130,12 +130,30 @@ fn check_joints(
                 format!("a joint type that is not supported \"{:?}\"", joint.kind).to_lowercase();
             findings.fail(&place, what, "use revolute, continuous, prismatic or fixed");
         }
-        let moving = joint.kind != T::Fixed;
-        if moving && Vector::from(joint.axis).norm() < 1e-9 {
-            findings.fail(&place, "its axis has length zero", "give an axis such as \"0 0 1\"");
-        }
+        check_axis(joint, &place, findings);
         let follows = joint.mimic.is_some() || passive.contains_key(&joint.name);
         check_limits(joint, follows, &place, findings);
+    }
+}
+
+/// Checks the length of the axis of a joint that moves. Here it has no meaning, but some readers
+/// take it for a gear ratio, and rerun makes quaternions of it that are no unit ones.
+fn check_axis(joint: &RawJoint, place: &str, findings: &mut Findings) {
+    /// Difference from one that is rounding.
+    const ROUNDED: f64 = 1e-3;
+    if joint.kind == urdf_rs::JointType::Fixed {
+        return;
+    }
+    let length = Vector::from(joint.axis).norm();
+    if length < 1e-9 {
+        findings.fail(place, "its axis has length zero", "give an axis such as \"0 0 1\"");
+    } else if (length - 1.0).abs() > ROUNDED {
+        let what = format!("its axis has length {length:.4}: it is taken as a unit vector");
+        findings.warn(
+            place,
+            what,
+            "make it one: yourdfpy, PyBullet and rerun move the link by another value",
+        );
     }
 }
 

@@ -33,6 +33,18 @@ fn a_urdf_is_read_in_the_encoding_that_it_declares() {
 }
 
 #[test]
+fn an_axis_of_another_length_is_taken_as_a_unit_vector_and_named() {
+    let with = |axis: &str| {
+        let text = turned("", "", "").replace("xyz='0 0 1'/>", &format!("xyz='{axis}'/>"));
+        let (model, said) = Folder::new().with("robot.urdf", text).load();
+        assert!((model.joints[0].axis.norm() - 1.0).abs() < 1e-12, "{axis}");
+        said.iter().any(|f| f.severity == Severity::Warning && f.what.contains("axis has length"))
+    };
+    assert_eq!(["0 0 1", "0.6 0 0.8", "0.577 0.577 0.577"].map(with), [false; 3]);
+    assert_eq!(["0 0 2", "1 1 0", "0 0 0.001"].map(with), [true; 3]);
+}
+
+#[test]
 fn a_quaternion_counts_from_version_1_1_on_and_lint_says_who_reads_it() {
     // A quarter turn about x, not of unit length, as people write it.
     let quat = "quat_xyzw='2 0 0 2'";
