@@ -17,7 +17,7 @@ const MIN_HOSE: u32 = 1750;
 /// of a voxel's edge: 20 cm and 60 cm, or 30 cm and 1.2 m, which legs of benches are not.
 const LATE_HOSES: [(u32, u32); 2] = [(1000, 3000), (1500, 6000)];
 /// Way along such a part to where its direction is measured, hundredths of a voxel's edge: from its
-/// first 4 cm to what is 10 to 14 cm on.
+/// first 4 cm to the first 4 cm that are at least 10 cm on.
 const BEGIN: u32 = 200;
 const NEXT: u32 = 500;
 /// Least distance between these, voxels: half of the least way.
