@@ -6,13 +6,15 @@ use crate::body_cut::{Body, TouchesRobot};
 use crate::bridges::bridges;
 use crate::facets::VoxelFacet;
 use crate::floating::{self, Bodies};
+use crate::hands::{hands, wrists};
+use crate::hidden_ends::EndsOf;
 use crate::settings::Settings;
 use crate::share::{Share, share};
 use crate::structure::{LEAST_STRUCTURE, beyond_hoses};
 use crate::thin::{self, LocalShape};
 use crate::voxel_graph::Graph;
 use contract::{Fit, Fold, Label, LinkAt, RESIDUAL_EDGE, ResidualVoxel, Result, Voxel};
-use robot::{JointKind, Model};
+use robot::Model;
 
 /// Decides which residual voxels are attached to which link.
 pub struct Attach {
@@ -257,6 +259,26 @@ impl Attach {
         paths.iter().zip(&of.length).map(is_near).collect()
     }
 
+    /// The graph with hidden ends of hoses joined to them; what ends beside a link touches it.
+    fn with_hidden_ends(
+        &self,
+        graph: Graph,
+        residual: &mut [ResidualVoxel],
+        links: &[ResidualVoxel],
+    ) -> Graph {
+        let hidden = EndsOf {
+            graph: &graph,
+            voxels: residual,
+            links,
+            thin: self.settings.thin,
+            is_moving: &|link| self.is_moving(link),
+            in_contact: &|voxel| self.in_contact(voxel),
+        }
+        .find(&graph.components());
+        hidden.ends.iter().for_each(|at| residual[*at].distance = self.settings.contact);
+        graph.with_edges(&hidden.edges)
+    }
+
     /// Whether a voxel touches a link that moves.
     fn in_contact(&self, voxel: &ResidualVoxel) -> bool {
         voxel.distance <= self.settings.contact && self.is_moving(voxel.nearest)
@@ -313,14 +335,14 @@ impl Fold for Attach {
 
     fn finish(&self, mut sum: ResidualSum) -> Result<Attached> {
         sum.merge();
-        let (residual, links): (Vec<ResidualVoxel>, Vec<ResidualVoxel>) =
+        let (mut residual, links): (Vec<ResidualVoxel>, Vec<ResidualVoxel>) =
             sum.voxels.into_iter().partition(|v| v.n_residual > 0);
         // Voxels without residual points are filled by a link. They show the roughness of the link
         // and must not connect components.
         let places: Vec<Voxel> = residual.iter().map(|v| v.voxel).collect();
         let graph = Graph::new(&places);
         let bridges = bridges(&graph, self.settings.thin);
-        let graph = graph.with_edges(&bridges);
+        let graph = self.with_hidden_ends(graph.with_edges(&bridges), &mut residual, &links);
         let mut paths = vec![(u32::MAX, u32::MAX); residual.len()];
         let components = graph.components();
         let mut decided = Decided { labels: vec![None; residual.len()], groups: Vec::new() };
@@ -351,27 +373,6 @@ impl ResidualSum {
     }
 }
 
-/// For each link, whether a joint moves it and no link that another joint moves comes after it.
-fn hands(model: &Model) -> Vec<bool> {
-    let moving = model.moving();
-    let mut carries = vec![false; moving.len()];
-    for joint in model.joints.iter().rev() {
-        let turns = joint.kind != JointKind::Fixed;
-        carries[joint.parent] |= carries[joint.child] || turns;
-    }
-    moving.iter().zip(carries).map(|(moving, carries)| *moving && !carries).collect()
-}
-
-/// The links of [`hands`], and the link to which the first of them is joined.
-fn wrists(model: &Model) -> Vec<bool> {
-    let hands = hands(model);
-    let mut wrists = hands.clone();
-    for joint in model.joints.iter().filter(|joint| hands[joint.child]) {
-        wrists[joint.parent] = true;
-    }
-    wrists
-}
-
 /// Whether a link is among those that are true in these lists, by robot.
 fn is_among(links: &[Vec<bool>], at: LinkAt) -> bool {
     links.get(usize::from(at.robot)).and_then(|links| links.get(usize::from(at.link)))
@@ -390,6 +391,8 @@ fn most_frequent(marks: &mut [u32]) -> Option<LinkAt> {
     best.map(|(_, mark)| LinkAt { robot: (mark >> 16) as u16, link: (mark & 0xffff) as u16 })
 }
 
+#[cfg(test)]
+mod hose_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -10,8 +10,8 @@
 //! What they disagree on is uncertain, and so is what a deeper cut leaves to the hand, if that may
 //! be a tool; the rest is fixed. Cuts follow inner corners of the surface, where things touch. What
 //! rests on something so lightly that it cannot stand there, or hangs on a hose besides, moves with
-//! the hand that it touches. A body in the air beside a hand, far from everything else, belongs to
-//! the hand.
+//! the hand that it touches. A hose whose end is in a shadow touches the link at which it points. A
+//! body in the air beside a hand, far from everything else, belongs to the hand.
 #![forbid(unsafe_code)]
 
 mod attached;
@@ -21,7 +21,9 @@ mod decide;
 mod deeper;
 mod facets;
 mod floating;
+mod hands;
 mod held;
+mod hidden_ends;
 mod hulls;
 mod layers;
 mod max_flow;

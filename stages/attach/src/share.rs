@@ -44,6 +44,10 @@ pub(crate) enum Share {
 pub(crate) fn share(body: &Body<'_>) -> Vec<Share> {
     let mut near = body.robot_side(Preference::NearRobot);
     let far = body.robot_side(Preference::NearFixed);
+    // A hose holds nothing: what only hoses join to the building is the robot's, flat or not.
+    if is_whole(body, &far) {
+        near.clone_from(&far);
+    }
     let is_hose = |k: usize| body.shape[k] == LocalShape::Hose;
     let n = body.graph.len();
     // A cut that leaves more than a tool on the robot's side has not found where the tool ends, nor

@@ -17,9 +17,9 @@ const MIN_HOSE: u32 = 1750;
 /// of a voxel's edge: 20 cm and 60 cm, or 30 cm and 1.2 m, which legs of benches are not.
 const LATE_HOSES: [(u32, u32); 2] = [(1000, 3000), (1500, 6000)];
 /// Way along such a part to where its direction is measured, hundredths of a voxel's edge: from its
-/// first 4 cm to what is 10 to 14 cm on.
+/// first 4 cm to the first 4 cm that are at least 10 cm on.
 const BEGIN: u32 = 200;
-const NEXT: std::ops::Range<u32> = 500..700;
+const NEXT: u32 = 500;
 /// Least distance between these, voxels: half of the least way.
 const MIN_ALONG: f64 = 2.5;
 /// Least cosine of the angle with the vertical of something upright (18°).
@@ -84,7 +84,7 @@ pub(crate) fn shapes(graph: &Graph, length: &[u32], thin: f64) -> Vec<LocalShape
 }
 
 /// A long thin part that leads away from the robot.
-struct ThinPart {
+pub(crate) struct ThinPart {
     voxels: Vec<usize>,
     /// Where it begins, and the way from there along its first stretch, voxels.
     begin: [f64; 3],
@@ -93,16 +93,24 @@ struct ThinPart {
 
 impl ThinPart {
     /// `None` where it leads away to both sides.
-    fn of(graph: &Graph, length: &[u32], voxels: Vec<usize>) -> Option<Self> {
+    pub(crate) fn of(graph: &Graph, length: &[u32], voxels: Vec<usize>) -> Option<Self> {
         let begins = voxels.iter().map(|k| length[*k]).min()?;
         let mean = |range: std::ops::Range<u32>| {
             mean_of(graph, voxels.iter().filter(|k| range.contains(&(length[**k] - begins))))
         };
-        let (begin, next) = (mean(0..BEGIN), mean(NEXT));
+        // Behind a gap the next of it is farther on.
+        let ways = voxels.iter().map(|k| length[*k] - begins);
+        let next = ways.filter(|way| *way >= NEXT).min()?;
+        let (begin, next) = (mean(0..BEGIN), mean(next..next + BEGIN));
         let along: [f64; 3] = std::array::from_fn(|i| next[i] - begin[i]);
         // What leads away to both sides is on average where it begins.
         let is_one_way = along.iter().map(|v| v * v).sum::<f64>() >= MIN_ALONG * MIN_ALONG;
         is_one_way.then_some(Self { voxels, begin, along })
+    }
+
+    /// Where it begins, and the way from there along its first stretch, voxels.
+    pub(crate) fn begin_and_way(&self) -> ([f64; 3], [f64; 3]) {
+        (self.begin, self.along)
     }
 
     /// Whether it begins not far from the robot for its length.
