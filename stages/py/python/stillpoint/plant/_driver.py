@@ -106,8 +106,14 @@ class _Driver:
         memory = min((node.get("memory", 0) for node in nodes), default=0)
         # Few shards get several threads each.
         share = max(1, min(max(cores), sum(cores) // (len(ready) + len(started))))
+        # Ray does not keep the order of tasks that ask for different amounts of memory, and the longest shards must not
+        # come last: it gets those that have a place, and one a node that waits for its place there.
+        room = sum(cores) + len(cores) - sum(cpus for *_, cpus in self.running.values())
         for shard in sorted(ready, key=lambda shard: (-shard["seconds"], shard["id"])):
+            if room <= 0:
+                break
             cpus = max(cores) if shard["kind"] in JOINS else share
+            room -= cpus
             self._submit(shard, cpus, int(min(shard["memory_bytes"], MEMORY * memory)))
 
     def _submit(self, shard: Event, cpus: int, memory: int) -> None:
@@ -119,11 +125,11 @@ class _Driver:
         options = {"num_cpus": cpus, "max_retries": self.job.attempts - 1, "name": f"{shard['id']}: {shard['what']}"}
         options |= {"memory": memory} if memory > 0 else {}
         reference = self.make.options(**options).remote(line, self.job.folder, environment)
-        self.running[reference] = (shard, time.monotonic())
+        self.running[reference] = (shard, time.monotonic(), cpus)
 
     def _end(self, reference) -> Event | None:
         """Takes note of the end of a task; returns the outcome of the job where it was the last."""
-        shard, begun = self.running.pop(reference)
+        shard, begun, _ = self.running.pop(reference)
         try:
             ended = self.ray.get(reference)
         except self.ray.exceptions.RayError as error:
