@@ -196,7 +196,7 @@ fn bodies(run: &Run<'_>, ground: &Ground) -> (Vec<Cluster>, Vec<Region>) {
     (clusters, regions)
 }
 
-/// Keeps the ground of a plant, with which its shard is made, after what all later shards ask of it.
+/// Keeps the ground of a plant, with which its shard is made, after what later shards ask of it.
 pub(super) fn keep_ground(run: &Run<'_>, tiles: &[Key], ground: &Ground) -> Result<()> {
     let kept = ground_kept(run, tiles);
     kept.keep(BODIES, &bodies(run, ground))?;
