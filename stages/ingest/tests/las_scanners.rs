@@ -138,7 +138,7 @@ fn source_ids_are_read_once_by_all_that_share_what_they_learn() {
     );
     let (settings, kept) = (Settings::default(), OneKept::default());
     let names = || {
-        let (paths, scanners) = (&[path.clone()], Some(&scanners));
+        let (paths, scanners) = (std::slice::from_ref(&path), Some(&scanners));
         let opened = open_known(Before::default(), paths, scanners, &settings, &kept, &OneByOne);
         opened.unwrap().scans.into_iter().map(|scan| scan.name).collect::<Vec<_>>()
     };
@@ -148,7 +148,7 @@ fn source_ids_are_read_once_by_all_that_share_what_they_learn() {
     let others: Vec<_> = mixed().into_iter().map(|(xyz, _, held)| (xyz, 1, held)).collect();
     std::fs::write(&path, las(&others, 0)).unwrap();
     assert_eq!(names(), before);
-    let opened = open(&[path.clone()], Some(&scanners), &settings, &OneByOne).unwrap();
+    let opened = open(std::slice::from_ref(&path), Some(&scanners), &settings, &OneByOne).unwrap();
     assert_eq!(opened.scans.len(), 1);
 }
 
