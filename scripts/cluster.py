@@ -10,7 +10,8 @@ Wants Linux, root, and a Python with ray (`pip install ray`). The nodes see each
 else; the disk is that of the machine. A node is killed with all of its processes, and started again three seconds later. The
 head is killed with its store, so that all nodes start again: Ray gives up after a minute.
 
-Each row of OUT/rows.jsonl is one job: wall-clock time, kills, shards that were made twice, and whether the bytes are the same."""
+Each row of OUT/rows.jsonl is one job: wall-clock time, processor time of the program, seconds that the processors of the machine
+were busy (with other people's work and Ray, too), kills, shards that were made twice, and whether the bytes are the same."""
 
 import json
 import os
@@ -127,6 +128,12 @@ class Cluster:
         for node in self.nodes():
             node.start()
 
+    def rest(self):
+        """Ends all processes of all nodes, so that a run on this machine has it for itself."""
+        for node in self.nodes():
+            if node.init:
+                quietly(node.kill)
+
     def heal(self, keep):
         """Starts nodes again whose Ray has ended. `keep` is the command line of the process that the driver's node keeps."""
         for node in [*self.workers, self.driver]:
@@ -161,6 +168,13 @@ def quietly(work, *args):
         print(f"# {error}", file=sys.stderr)
 
 
+def busy():
+    """Seconds that all processors have worked since the machine started, for whomever."""
+    first = Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]
+    idle = int(first[3]) + int(first[4])
+    return (sum(map(int, first[:8])) - idle) / os.sysconf("SC_CLK_TCK")
+
+
 def files(out):
     """All files of a result with their bytes' digests, except the store."""
     import hashlib
@@ -181,7 +195,7 @@ def plant(cluster, job, out, python, node_kills, head_kills, draw, length):
     line += ["--address", f"{cluster.head.ip}:{PORT}", "--program", str(Path(flags.program).resolve()), "--events"]
     line += ["--"] + (["--scanners", str(flags.scanners)] if flags.scanners else [])
     environment = {**cluster.environment, "PYTHONPATH": str(flags.package)}
-    begun, events = time.monotonic(), open(out.with_suffix(".events"), "w")
+    begun, worked, events = time.monotonic(), busy(), open(out.with_suffix(".events"), "w")
     process = subprocess.Popen(cluster.driver.inside(line), env=environment, stdout=events)
     kills = [(draw.uniform(0, length), "node") for _ in range(node_kills)] + [(draw.uniform(0, length), "head") for _ in range(head_kills)]
     kills, away, done = sorted(kills), [], {"node": 0, "head": 0}
@@ -205,7 +219,7 @@ def plant(cluster, job, out, python, node_kills, head_kills, draw, length):
         time.sleep(0.2)
     for _, node in away:
         node.start()
-    seconds = time.monotonic() - begun
+    seconds, worked = time.monotonic() - begun, busy() - worked
     if process.poll() is None:
         process.kill()
     events.close()
@@ -213,7 +227,7 @@ def plant(cluster, job, out, python, node_kills, head_kills, draw, length):
     ends = [event for event in said if event["event"] == "shard"]
     made = [event["id"] for event in ends]
     return {"seconds": round(seconds, 2), "code": process.returncode, **{f"{kind}_kills": n for kind, n in done.items()},
-            "processor": round(sum(e["processor"] for e in ends), 2), "shards": len(set(made)), "ends": len(made), "failures": sum(e["event"] == "failure" for e in said),
+            "processor": round(sum(e["processor"] for e in ends), 2), "busy": round(worked, 2), "shards": len(set(made)), "ends": len(made), "failures": sum(e["event"] == "failure" for e in said),
             "drivers": 1 + sum(e["event"] == "restart" for e in said)}
 
 
@@ -239,24 +253,26 @@ def main():
 
     def single():
         shutil.rmtree(folder / "one", ignore_errors=True)
-        begun, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        begun, worked, before = time.monotonic(), busy(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(job.command(folder / "one", "--threads", "2"), check=True, stdout=subprocess.DEVNULL)
-        after, seconds = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic() - begun
+        after, seconds, worked = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic() - begun, busy() - worked
         processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         # Its digests are enough: a large result fills the disk.
         expected.clear()
         expected.update(files(folder / "one"))
         shutil.rmtree(folder / "one", ignore_errors=True)
-        row(job="one machine, two threads", seconds=round(seconds, 2), processor=round(processor, 2))
+        row(job="one machine, two threads", seconds=round(seconds, 2), processor=round(processor, 2), busy=round(worked, 2))
 
     cluster = Cluster(flags.python, folder)
     try:
-        cluster.start()
         length = 60.0
         kinds = ["plain"] * flags.jobs + ["node"] * flags.node_kills + ["head"] * flags.head_kills
         for number, kind in enumerate(kinds):
             if kind == "plain":
+                cluster.rest()
                 single()
+            if kind == "plain" or not number:
+                cluster.start()
             out = folder / "many"
             shutil.rmtree(out, ignore_errors=True)
             entry = plant(cluster, job, out, flags.python, kind == "node", kind == "head", draw, length)

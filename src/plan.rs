@@ -281,6 +281,7 @@ impl<'a> Run<'a> {
         let scans = ScansToLabel { sources, store, floor, clusters };
         let labelling = Labelling::new(robots, &scans, settings);
         let written = if let Some(chosen) = chosen {
+            let labelling = labelling.keeping(chosen);
             let near = NearRobots::kept(chosen, &sources.masks, None)?;
             let pieces = self.label_folders(chosen, &sources.inputs);
             let groups = self.file_folders(chosen, sources);

@@ -10,6 +10,7 @@ use super::known_space::{SpaceGrids, mark};
 use super::label_strips::{LabelStrip, LabelledStrip};
 use super::masks::{MaskCount, Masks};
 use super::near_robots::{NearRobots, ScansNearRobots};
+use crate::cache::Cache;
 use crate::detect::robot_id::robot_id;
 use crate::detect::robots::{FittedRobots, poses};
 use crate::engine::{AllThreads, Engine, PipeSender, PipedItems, Task};
@@ -46,6 +47,8 @@ pub(crate) struct Labelling<'a> {
     pub(super) export: export::Settings,
     /// Clusters, where each point is to get the number of its cluster.
     bodies: Option<ClusterLookup>,
+    /// Where outlines of robots are kept for other processes.
+    pub(super) outlines: Option<&'a Cache>,
 }
 
 /// The scans whose points are labelled, and floor and clusters in them.
@@ -187,6 +190,7 @@ impl<'a> Labelling<'a> {
             bounds,
             export,
             bodies,
+            outlines: None,
         }
     }
 
@@ -377,18 +381,6 @@ impl<'a> Labelling<'a> {
         let all = self.bounds.iter().fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
         let of_input = self.sources.las_quantum();
         Quantum::holding(&all, of_input.map(|(scale, offset)| Quantum { scale, offset }))
-    }
-
-    pub(super) fn robot_pictures(
-        &self,
-        chosen: &[usize],
-        engine: &Engine,
-    ) -> Result<Vec<RobotPicture>> {
-        engine.each(chosen.to_vec(), |i| {
-            let fit = &self.fits[i];
-            let model = &self.models[fit.model];
-            Ok(RobotPicture::new(i as i16, model, &poses(fit, model), &AllThreads))
-        })
     }
 
     /// A robot as the plan shows it: one that was refused without outline and reach.

@@ -11,3 +11,4 @@ pub(crate) mod masks;
 pub(crate) mod near_robots;
 pub(crate) mod page_parts;
 mod piece_records;
+mod robot_pictures;

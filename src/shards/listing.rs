@@ -18,7 +18,9 @@ use std::path::Path;
 /// Name of the piece of what an input adds to the ground.
 pub(super) const PART: &str = "part";
 /// Name of the piece of the ground.
-pub(super) const GROUND: &str = "ground";
+const GROUND: &str = "ground";
+/// Name of the piece of what stands about in the plant, and its regions.
+const BODIES: &str = "bodies";
 /// Number of digits of an id, of its digest: enough for a billion shards.
 const DIGITS: usize = 16;
 
@@ -180,15 +182,29 @@ impl Listing {
 
 /// Ground, clusters and regions of a plant, from the store.
 fn plant(run: &Run<'_>, tiles: &[Key]) -> Option<GroundAndRegions> {
-    let ground: Ground = ground_kept(run, tiles).get(GROUND)?;
-    let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
-    let clusters = cluster::split(space, floor, &run.settings.cluster);
-    let regions = base_search::regions(&clusters, &run.settings.region);
+    let kept = ground_kept(run, tiles);
+    let ground: Ground = kept.get(GROUND)?;
+    let (clusters, regions) = kept.get(BODIES).unwrap_or_else(|| bodies(run, &ground));
     Some(GroundAndRegions { ground, clusters, regions })
 }
 
+/// What stands about in the plant, and the regions of it that are searched.
+fn bodies(run: &Run<'_>, ground: &Ground) -> (Vec<Cluster>, Vec<Region>) {
+    let (space, floor) = (&ground.surfaces.occupancy, &ground.surfaces.floor);
+    let clusters = cluster::split(space, floor, &run.settings.cluster);
+    let regions = base_search::regions(&clusters, &run.settings.region);
+    (clusters, regions)
+}
+
+/// Keeps the ground of a plant, with which its shard is made, after what later shards ask of it.
+pub(super) fn keep_ground(run: &Run<'_>, tiles: &[Key], ground: &Ground) -> Result<()> {
+    let kept = ground_kept(run, tiles);
+    kept.keep(BODIES, &bodies(run, ground))?;
+    kept.keep(GROUND, ground)
+}
+
 /// Pieces of the ground of a plant.
-pub(super) fn ground_kept(run: &Run<'_>, tiles: &[Key]) -> Cache {
+fn ground_kept(run: &Run<'_>, tiles: &[Key]) -> Cache {
     Cache::new(run.output.fits(), run.digests.ground_key(tiles, run.settings))
 }
 

@@ -1,13 +1,12 @@
 //! The work of one shard: one step of the plan, whose result becomes a piece of the store.
 
 use super::list::Shard;
-use super::listing::{
-    GROUND, GroundAndRegions, Listing, PART, ShardTask, ground_kept, input_tiles,
-};
+use super::listing::{GroundAndRegions, Listing, PART, ShardTask, input_tiles, keep_ground};
 use crate::cache::{Cache, Key, settle_folder};
 use crate::detect::ground::{Ground, GroundPart};
 use crate::detect::robots::RobotList;
 use crate::detect::search::{PreparedLibrary, Search};
+use crate::detect::tools::attach_tools;
 use crate::engine::guarded;
 use crate::job::Outcome;
 use crate::label::input_labels;
@@ -120,7 +119,7 @@ fn ground(run: &Run<'_>, opened: &Opened, tiles: &[Key], store: Store) -> Result
         })
     });
     let ground = Ground::join(parts, scans, settings)?;
-    ground_kept(run, tiles).keep(GROUND, &ground)
+    keep_ground(run, tiles, &ground)
 }
 
 /// A plant whose regions are known.
@@ -152,12 +151,25 @@ impl OfPlant<'_> {
     }
 
     fn region(&self, region: &Region, search: &Search<'_, '_>, fits: &Cache) -> Result<()> {
-        let find = || search.region(region);
+        let find = || {
+            let fits = search.region(region)?;
+            self.likely_tools(&fits, search);
+            Ok(fits)
+        };
         let found: Vec<Vec<Fit>> = self.run.engine.fan_out("fit", vec![()], |()| {
             guarded("fit", 0, || fits.get_or_compute(&format!("{region:?}"), find))
         })?;
         drop(found);
         Ok(())
+    }
+
+    /// Looks for tools of the robots that this region alone would have, while its models are
+    /// prepared: the choice among all regions, which one process makes, finds most of them in the
+    /// store. What is wrong with one is told there.
+    fn likely_tools(&self, fits: &[Fit], search: &Search<'_, '_>) {
+        let mut models = self.opened.library.models.clone();
+        let likely = fit::choose(fits.to_vec(), &models, |_| false);
+        let _ = attach_tools(likely, &mut models, search, self.run.engine);
     }
 
     /// Chooses the robots among the fits of all regions, and labels the points near them.
@@ -227,7 +239,7 @@ impl OfPlant<'_> {
         let new = run.output.labels().join(format!("{prefix}{}", atomic::own_word()));
         let place = &run.label_folders(&chosen, std::slice::from_ref(input))[0];
         let grids = spaces.grids();
-        let labelling = self.labelling(&robots);
+        let labelling = self.labelling(&robots).keeping(&chosen);
         let written = input_labels::write(labelling, &near, &grids, input, &new, run.engine);
         let written = written.and_then(|()| run.digests.check(input));
         settled(written, &new, place, &prefix, input_labels::is_whole)

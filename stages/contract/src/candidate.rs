@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub type Voxel = [i32; 3];
 
 /// A connected set of occupied voxels above the floor, over all scans.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cluster {
     /// Number of the cluster; clusters are numbered by size, the largest first.
     pub id: u32,

@@ -2,10 +2,11 @@
 
 use crate::{MaskId, ScanId};
 use geometry::{Aabb, DepthImage, Point};
+use serde::{Deserialize, Serialize};
 
 /// A part of the world with a local frame: world axes, shifted to `origin`, so that the precision
 /// of `f32` is sufficient.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Region {
     /// Origin of the local frame in the world, metres.
     pub origin: Point,

@@ -34,10 +34,10 @@ pub(crate) struct PictureView {
     /// Subtracted from points, so that `f32` is precise enough.
     origin: Point,
     pub(crate) points: Vec<(f32, Rgb)>,
-    outline: Vec<bool>,
+    pub(crate) outline: Vec<bool>,
     /// For each pixel the depth of the posture's surface and the cosine of its angle to the
     /// viewer, and the distance of the nearest point from it.
-    surface: Vec<(f32, f32)>,
+    pub(crate) surface: Vec<[f32; 2]>,
     pub(crate) residuals: Vec<(f32, f32)>,
 }
 
@@ -55,6 +55,16 @@ impl RobotPicture {
     /// The views of the robot with this index in the labels and with links at `world_from_link`.
     #[must_use]
     pub fn new(robot: i16, model: &Model, world_from_link: &[Pose], fan: &dyn Fan) -> Self {
+        let blank = Self::blank(robot, model, world_from_link);
+        let views = fan.fan(blank.views, |mut view: PictureView| {
+            view.outline(model, world_from_link);
+            view
+        });
+        Self { views, ..blank }
+    }
+
+    /// The same without the surface of the posture.
+    pub(crate) fn blank(robot: i16, model: &Model, world_from_link: &[Pose]) -> Self {
         let mut bounds = Aabb::EMPTY;
         for (link, pose) in model.links.iter().zip(world_from_link) {
             for corner in link.bounds.corners() {
@@ -71,13 +81,10 @@ impl RobotPicture {
             ("top", -90.0, 90.0),
             ("oblique", 40.0, 30.0),
         ];
-        let views = fan.fan(views.into(), |(name, turn, tilt): (_, f64, f64)| {
-            let mut view = PictureView::new(name, turn, tilt, &shown);
-            view.outline(model, world_from_link);
-            view
-        });
+        let views = views.into_iter();
+        let views = views.map(|(name, turn, tilt)| PictureView::new(name, turn, tilt, &shown));
         let links = model.links.iter().map(|link| link.name.clone()).collect();
-        Self { robot, bounds: shown.grown(AROUND), links, views }
+        Self { robot, bounds: shown.grown(AROUND), links, views: views.collect() }
     }
 
     /// Bounds of what the views show, world, metres.
@@ -168,7 +175,7 @@ impl PictureView {
             origin: bounds.center(),
             points: vec![(f32::INFINITY, WHITE); SIDE * SIDE],
             outline: vec![false; SIDE * SIDE],
-            surface: vec![(f32::NAN, 0.0); SIDE * SIDE],
+            surface: vec![[f32::NAN, 0.0]; SIDE * SIDE],
             residuals: vec![(f32::INFINITY, 0.0); SIDE * SIDE],
         }
     }
@@ -185,7 +192,7 @@ impl PictureView {
     /// if the point is the nearest to the viewer; measured across the surface.
     fn measure(&mut self, world: [f64; 3]) {
         let Some((u, v, depth)) = self.pixel(world) else { return };
-        let (surface, facing) = self.surface[v * SIDE + u];
+        let [surface, facing] = self.surface[v * SIDE + u];
         let off = (surface - depth) * facing;
         let pixel = &mut self.residuals[v * SIDE + u];
         // Points of surfaces behind the visible one do not count.
@@ -231,7 +238,7 @@ impl PictureView {
         for (own, shown) in self.surface.iter_mut().zip(&shown) {
             if shown.link != u16::MAX {
                 let facing = away.dot(&Vector::from(shown.normal.map(f64::from))).abs();
-                *own = (shown.depth, facing as f32);
+                *own = [shown.depth, facing as f32];
             }
         }
         for v in 1..SIDE {
@@ -268,7 +275,7 @@ impl PictureView {
         for v in 0..SIDE {
             for u in 0..SIDE {
                 let (depth, off) = self.residuals[v * SIDE + u];
-                let mut color = if self.surface[v * SIDE + u].0.is_nan() { WHITE } else { UNSEEN };
+                let mut color = if self.surface[v * SIDE + u][0].is_nan() { WHITE } else { UNSEEN };
                 if depth < f32::INFINITY {
                     color = residual_color(off);
                 }

@@ -39,6 +39,7 @@ pub mod narrow;
 pub mod plane;
 mod pose;
 pub mod probe;
+pub mod raw_list;
 pub mod robust;
 mod spread;
 mod stl;

@@ -14,6 +14,7 @@ use crate::reader::{
 };
 use crate::sampling;
 use crate::settings::Settings;
+use crate::source_census::SourceCensus;
 use crate::units::{ReferenceSystem, Units};
 use contract::{Error, Format, Result};
 use std::path::Path;
@@ -29,14 +30,22 @@ pub(crate) struct Las {
     /// Whether all points of a sample lie inside the stated bounds; then a piece with points
     /// outside is damaged.
     bounds_hold: bool,
+    /// The source ids of the file, where its scans are told apart by them.
+    census: Option<SourceCensus>,
     strip_points: usize,
 }
 
 impl Las {
-    /// Opens a LAS or LAZ file with the scanners that are known for it.
-    pub(crate) fn open(path: &Path, scanners: &[LasScanner], settings: &Settings) -> Result<Self> {
+    /// Opens a LAS or LAZ file with the scanners that are known for it, and its source ids where
+    /// they are known.
+    pub(crate) fn open(
+        path: &Path,
+        scanners: &[LasScanner],
+        census: Option<SourceCensus>,
+        settings: &Settings,
+    ) -> Result<Self> {
         let records = LasRecords::open(path, settings)?;
-        let found = las_scans::find(path, &records, scanners, settings)?;
+        let found = las_scans::find(path, &records, scanners, census, settings)?;
         let pose = |s: &ScanSeed| (s.world_from_scan, s.scanner_known);
         let poses: Vec<_> = found.scans.iter().map(pose).collect();
         let decoder = Decoder::new(&records.header, &poses, found.scan_of, settings.max_range);
@@ -47,6 +56,7 @@ impl Las {
             scans: found.scans,
             extents: found.extents,
             bounds_hold: found.bounds_hold,
+            census: found.census,
             records,
             decoder,
             strip_points: settings.strip_points.max(1),
@@ -65,6 +75,10 @@ impl Reader for Las {
 
     fn has_color(&self) -> bool {
         self.decoder.has_color()
+    }
+
+    fn census(&self) -> Option<&SourceCensus> {
+        self.census.as_ref()
     }
 
     fn quantum(&self) -> Option<([f64; 3], [f64; 3])> {

@@ -9,9 +9,9 @@ use crate::rasters_of_scans::{self, RastersOfScans};
 use crate::reader::ScanSeed;
 use crate::scan_of_point::{PlacesOfScans, ScanOfPoint};
 use crate::settings::Settings;
+use crate::source_census::SourceCensus;
 use contract::{PointRaster, Result, ScannerPosition};
 use geometry::{Aabb, Pose};
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A known scanner of the points of a LAS or LAZ file, or of those with one source id.
@@ -43,14 +43,8 @@ pub(crate) struct FoundScans {
     pub(crate) extents: Vec<(u64, u64)>,
     /// Whether all sampled points lie inside the stated bounds.
     pub(crate) bounds_hold: bool,
-}
-
-impl Census {
-    /// Estimated number of records of the whole file, of which `n` were seen in the sample.
-    fn likely(&self, n: u64, n_records: u64) -> u64 {
-        let all = n_records as f64;
-        (n as f64 / self.n_looked.max(1) as f64 * all) as u64
-    }
+    /// The source ids of the file, where they were asked for.
+    pub(crate) census: Option<SourceCensus>,
 }
 
 /// Note on the points of a file that no raster claims alone.
@@ -63,22 +57,12 @@ const CENSUS_WINDOWS: u64 = 512;
 /// Number of records in each window.
 const CENSUS_RECORDS: usize = 512;
 
-/// The source ids of a file, from all records or a sample of them.
-#[derive(Default)]
-struct Census {
-    /// First place, last place and number of records of each source id.
-    ids: BTreeMap<u16, (u64, u64, u64)>,
-    /// Number of records that were read.
-    n_looked: u64,
-    /// Whether every record was read.
-    complete: bool,
-}
-
-/// Finds the scans of a file.
+/// Finds the scans of a file. Its source ids are not read where they are `known`.
 pub(crate) fn find(
     path: &Path,
     records: &LasRecords,
     scanners: &[LasScanner],
+    known: Option<SourceCensus>,
     settings: &Settings,
 ) -> Result<FoundScans> {
     let header = &records.header;
@@ -108,6 +92,7 @@ pub(crate) fn find(
         scan_of: ScanOfPoint::One,
         extents: Vec::new(),
         bounds_hold: look.outside == 0 && header.bounds.is_some(),
+        census: None,
     };
     if scanners.iter().any(|s| s.raster.is_some()) {
         by_raster(&mut found, scanners, records, &stem, seed)?;
@@ -125,8 +110,9 @@ pub(crate) fn find(
         found.scans.push(scan);
         found.extents.push(whole);
     } else {
-        let census = census(records)?;
+        let census = known.map_or_else(|| census(records), Ok)?;
         by_source_id(&mut found, scanners, &census, header, &stem, seed);
+        found.census = Some(census);
     }
     found.scans.iter_mut().try_for_each(|scan| look.check(scan, settings))?;
     Ok(found)
@@ -154,7 +140,7 @@ fn whole_extent(header: &LasHeader) -> (u64, u64) {
 fn by_source_id(
     found: &mut FoundScans,
     scanners: &[LasScanner],
-    census: &Census,
+    census: &SourceCensus,
     header: &LasHeader,
     stem: &str,
     seed: impl Fn(String, Option<u16>, Option<Pose>) -> ScanSeed,
@@ -296,22 +282,12 @@ fn world(record: &[u8], header: &LasHeader) -> [f64; 3] {
 }
 
 /// Reads the source ids of all records of a small file, else those of windows.
-fn census(records: &LasRecords) -> Result<Census> {
+fn census(records: &LasRecords) -> Result<SourceCensus> {
     let header = &records.header;
     let layout = RecordLayout::of(header.format).expect("the header was checked");
-    let mut census = Census::default();
+    let mut census = SourceCensus::default();
     let mut add = |first: u64, run: &[u8]| {
-        let ids: Vec<u16> =
-            run.chunks_exact(header.record_len).map(|r| layout.source_id(r)).collect();
-        let mut place = first;
-        // Points of one scan usually follow one another.
-        for same in ids.chunk_by(|a, b| a == b) {
-            let n = same.len() as u64;
-            let id = census.ids.entry(same[0]).or_insert((place, place, 0));
-            *id = (id.0.min(place), id.1.max(place + n - 1), id.2 + n);
-            place += n;
-        }
-        census.n_looked += place - first;
+        census.add(first, run.chunks_exact(header.record_len).map(|r| layout.source_id(r)));
     };
     let stream = records.laz.as_ref().is_some_and(|l| l.pieces.is_empty());
     // A compressed record takes forty times as long.

@@ -63,6 +63,7 @@ mod scan_of_point;
 mod scanners;
 mod settings;
 mod size;
+mod source_census;
 mod sources;
 mod steps;
 mod text;

@@ -2,11 +2,11 @@
 //! the scanner can have stood at its stated position.
 
 use crate::file::{OpenFile, moved};
-
 use crate::position;
 use crate::raster::{self, ScanRaster, StepSource};
 use crate::reader::SampledPoint;
 use crate::settings::Settings;
+use crate::source_census::SourceCensus;
 use contract::{Result, Scan};
 use geometry::{Aabb, Point, Pose};
 use serde::{Deserialize, Serialize};
@@ -37,9 +37,14 @@ pub(crate) struct ScanLook {
     pub(crate) is_misplaced: bool,
 }
 
-/// What samples of the scans of an input have told, for others that open the same input.
+/// What samples of an input have told, for others that open the same input.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct InputLooks(pub(crate) Vec<ScanLook>);
+pub struct InputLooks {
+    /// Of each scan.
+    pub(crate) scans: Vec<ScanLook>,
+    /// The source ids of its points, where its scans are told apart by them.
+    pub(crate) census: Option<SourceCensus>,
+}
 
 /// Keeps what samples have told. Each of many processes that open the same inputs would otherwise
 /// sample all of them.

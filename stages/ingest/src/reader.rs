@@ -3,6 +3,7 @@
 
 use crate::map::Mapped;
 use crate::oddities::Oddities;
+use crate::source_census::SourceCensus;
 use crate::units::{ReferenceSystem, Units};
 use contract::{Attributes, Error, Format, Kind, PointRaster, Result, ScannerPosition};
 use geometry::{Aabb, Pose};
@@ -172,6 +173,10 @@ pub(crate) trait Reader: Send + Sync {
     fn masks(&self) -> &[MaskSeed];
     /// The scans of the file.
     fn scans(&self) -> &[ScanSeed];
+    /// The source ids of the file, where its scans were told apart by them.
+    fn census(&self) -> Option<&SourceCensus> {
+        None
+    }
     /// Up to `n` valid points of a scan, as runs of neighbours in file order, spread over the scan.
     fn sample(&self, scan: usize, n: usize) -> Result<Vec<SampledPoint>>;
     /// Up to `n` valid points of a scan (scan frame, metres), evenly spread over it, or over its

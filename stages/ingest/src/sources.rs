@@ -2,7 +2,6 @@
 //! lattice of each scan, and the strips of each input on request.
 
 use crate::file::OpenFile;
-
 use crate::format::detect;
 use crate::las::Las;
 use crate::looked::{InputLooks, KeepLooks, KeepNone};
@@ -124,8 +123,9 @@ fn open_all(
     }
     let none = KnownScanners::default();
     let mut poses = Poses::new(scanners.unwrap_or(&none), paths);
-    for path in paths {
-        sources.add(path, &mut poses, settings).map_err(|e| e.at(path.display()))?;
+    for (at, path) in paths.iter().enumerate() {
+        let added = sources.add(path, looks.known(at), &mut poses, settings);
+        added.map_err(|e| e.at(path.display()))?;
     }
     sources.find_lattices(settings, looks, fan)?;
     sources.warnings.extend(poses.unused());
@@ -291,13 +291,19 @@ impl Sources {
         Ok(())
     }
 
-    fn add(&mut self, path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<()> {
+    fn add(
+        &mut self,
+        path: &Path,
+        known: Option<InputLooks>,
+        poses: &mut Poses<'_>,
+        settings: &Settings,
+    ) -> Result<()> {
         // The caller adds the path to the error.
         if let Err(e) = regular(path) {
             return Err(e.without_place());
         }
         let meta = std::fs::metadata(path)?;
-        let reader = open_file(path, poses, settings)?;
+        let reader = open_file(path, known, poses, settings)?;
         let file = self.take(path.to_owned(), meta.len(), reader, |name| poses.by_scan_name(name));
         self.files.push(file);
         Ok(())
@@ -356,7 +362,7 @@ impl Sources {
     ) -> Result<()> {
         let n_scans = |file: &OpenFile| file.reader.scans().len();
         let known = |(f, file): (usize, &OpenFile)| {
-            looks.known(f).filter(|InputLooks(all)| all.len() == n_scans(file))
+            looks.known(f).filter(|known| known.scans.len() == n_scans(file))
         };
         let known: Vec<Option<InputLooks>> = self.files.iter().enumerate().map(known).collect();
         let all = (self.files.iter().enumerate())
@@ -375,12 +381,15 @@ impl Sources {
             let is_new = known.is_none();
             let own = match known {
                 Some(known) => known,
-                None => InputLooks(found.by_ref().take(n_scans(file)).collect::<Result<_>>()?),
+                None => InputLooks {
+                    scans: found.by_ref().take(n_scans(file)).collect::<Result<_>>()?,
+                    census: file.reader.census().cloned(),
+                },
             };
             if is_new {
                 looks.keep(f, &own);
             }
-            for (i, looked) in own.0.into_iter().enumerate() {
+            for (i, looked) in own.scans.into_iter().enumerate() {
                 let at = scan_of(file, i);
                 self.scans[at].notes.extend(looked.note);
                 self.scans[at].lattice = looked.raster.as_ref().map(|r| r.lattice);
@@ -412,11 +421,19 @@ impl Weigh for InputPiece {
     }
 }
 
-fn open_file(path: &Path, poses: &mut Poses<'_>, settings: &Settings) -> Result<Box<dyn Reader>> {
+fn open_file(
+    path: &Path,
+    known: Option<InputLooks>,
+    poses: &mut Poses<'_>,
+    settings: &Settings,
+) -> Result<Box<dyn Reader>> {
     match detect(path)? {
         Format::E57 => crate::e57::open(path, settings),
         Format::Ptx => crate::ptx::open(path, settings),
-        Format::Las | Format::Laz => Ok(Box::new(Las::open(path, &poses.of_las(path), settings)?)),
+        Format::Las | Format::Laz => {
+            let census = known.and_then(|known| known.census);
+            Ok(Box::new(Las::open(path, &poses.of_las(path), census, settings)?))
+        }
         format @ (Format::Pts | Format::Xyz | Format::Ply | Format::Pcd) => {
             crate::cloud::open(path, format, settings)
         }

@@ -3,8 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may panic, and say what they skip
 
 use contract::OneByOne;
-use ingest::{KnownScanners, Settings, Sources, Want, open};
+use ingest::{
+    Before, InputLooks, KeepLooks, KnownScanners, Settings, Sources, Want, open, open_known,
+};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 /// Point format 3 with `extra` bytes; each point is (x, y, z in millimetres, source id, withheld).
 fn las(points: &[([i32; 3], u16, bool)], extra: usize) -> Vec<u8> {
@@ -107,6 +110,46 @@ fn source_ids_go_to_their_scanners_and_the_rest_to_none() {
     assert_eq!(sources.masks[0].n_points, Some(5000));
     let kept = |id: u16| mixed().iter().filter(|p| p.1 == id && !p.2).count();
     assert_eq!(counts(&sources), [kept(1), kept(2), kept(0)]);
+}
+
+/// Keeps what is learnt of one input.
+#[derive(Default)]
+struct OneKept(Mutex<Option<InputLooks>>);
+
+impl KeepLooks for OneKept {
+    fn known(&self, at: usize) -> Option<InputLooks> {
+        assert_eq!(at, 0);
+        self.0.lock().unwrap().clone()
+    }
+
+    fn keep(&self, _: usize, looks: &InputLooks) {
+        let before = self.0.lock().unwrap().replace(looks.clone());
+        assert!(before.is_none(), "what is known is not learnt again");
+    }
+}
+
+#[test]
+fn source_ids_are_read_once_by_all_that_share_what_they_learn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), "hall.las", &las(&mixed(), 0));
+    let scanners = scanners(
+        "[[scanner]]\npoint_source_id = 1\nposition = [1001, 2, 3]\n\
+         [[scanner]]\npoint_source_id = 2\nposition = [1004, 5, 6]\n",
+    );
+    let (settings, kept) = (Settings::default(), OneKept::default());
+    let names = || {
+        let (paths, scanners) = (std::slice::from_ref(&path), Some(&scanners));
+        let opened = open_known(Before::default(), paths, scanners, &settings, &kept, &OneByOne);
+        opened.unwrap().scans.into_iter().map(|scan| scan.name).collect::<Vec<_>>()
+    };
+    let before = names();
+    assert_eq!(before, ["hall 1", "hall 2", "hall (rest)"]);
+    // Whoever reads the ids again finds others; that the file is the same is told by its digest.
+    let others: Vec<_> = mixed().into_iter().map(|(xyz, _, held)| (xyz, 1, held)).collect();
+    std::fs::write(&path, las(&others, 0)).unwrap();
+    assert_eq!(names(), before);
+    let opened = open(std::slice::from_ref(&path), Some(&scanners), &settings, &OneByOne).unwrap();
+    assert_eq!(opened.scans.len(), 1);
 }
 
 #[test]

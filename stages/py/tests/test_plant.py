@@ -177,6 +177,29 @@ def test_a_worker_that_dies_too_often_is_named(job, monkeypatch, capsys):
     assert end["shard"]["id"] == "tiles-1" and "the worker died" in end["why"]
 
 
+def test_ray_gets_the_longest_shards_first_and_no_more_than_it_has_room_for(job):
+    ray = FakeRay()
+    driver = _driver._Driver(job(), ray, None)
+    seconds = [3.0, 9.0, 1.0, 7.0, 8.0, 2.0]
+    driver.shards = {f"region-{i}": {"id": f"region-{i}", "kind": "region", "what": "", "needs": [], "seconds": s, "memory_bytes": 1 << 20}
+                     for i, s in enumerate(seconds)}
+
+    def asked():
+        driver._start()
+        return [options["name"].split(":")[0] for options in ray.options_seen]
+
+    # Two cores, and one that waits for its place on the only node.
+    assert asked() == ["region-1", "region-4", "region-3"] == asked()
+    driver.running.pop(2)
+    driver.done.add("region-4")
+    assert asked()[3:] == ["region-0"]
+    files = {**driver.shards["region-0"], "kind": "files", "id": "files-0"}
+    driver.shards, driver.running = {"files-0": files}, {}
+    assert asked()[4:] == ["files-0"] and ray.options_seen[4]["num_cpus"] == 2
+    line = ray.results[5][1][0]
+    assert line[line.index("--threads") + 1] == str(2 * _driver.THREADS_OF_WAITS)
+
+
 def test_another_driver_starts_where_the_cluster_is_lost(job, monkeypatch, tmp_path):
     from stillpoint.plant import _outer
 

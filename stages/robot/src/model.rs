@@ -24,8 +24,10 @@ pub struct Mesh {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct CadCloud {
     /// Positions of the samples, metres.
+    #[serde(with = "geometry::raw_list")]
     pub points: Vec<[f32; 3]>,
     /// Outward unit normals.
+    #[serde(with = "geometry::raw_list")]
     pub normals: Vec<[f32; 3]>,
     /// Mean distance between neighbouring samples, metres.
     pub spacing: f32,

@@ -4,6 +4,7 @@ ends a driver that has lost the head without an exception and without ``finally`
 import json
 import os
 import time
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from . import _task
 from ._job import FINAL, PARTIAL, Event, Job, JobFailed, ShardFailed, last_lines
@@ -14,17 +15,22 @@ LOOK = 1.0
 BACK_OFF = 1.0
 #: Kinds of shards that join what others have made, and run alone: they get all threads of a node.
 JOINS = ("ground", "robots", "gather")
+#: Kinds of shards that wait for the disk: they get more threads than cores, so that one computes while others wait.
+WAITS = ("files",)
+THREADS_OF_WAITS = 3
 #: Share of a node's memory that one shard may ask for, so that a large estimate never waits for ever.
 MEMORY = 0.9
 
 
 def drive(job: Job) -> int:
     """Does a job, and writes events to standard output, the last one with the end."""
+    # The first list loads the library, and the engine takes seconds to start: both at once.
+    first = ThreadPoolExecutor(1).submit(job.shards)
     try:
         import ray
 
         ray.init(address=job.address, logging_level="ERROR", log_to_driver=False, include_dashboard=None)
-        outcome = _Driver(job, ray).run()
+        outcome = _Driver(job, ray, first).run()
         _say({"event": "end", "code": PARTIAL if outcome["partial"] else 0, **outcome})
     except JobFailed as error:
         shard = error.shard if isinstance(error, ShardFailed) else None
@@ -39,7 +45,7 @@ def _say(event: Event) -> None:
 
 
 class _Driver:
-    def __init__(self, job: Job, ray):
+    def __init__(self, job: Job, ray, first: "Future[Event]"):
         ray.cloudpickle.register_pickle_by_value(_task)
         self.job, self.ray = job, ray
         self.make = ray.remote(_task.make)
@@ -50,10 +56,11 @@ class _Driver:
         self.not_before: dict[str, float] = {}
         self.left_out: list[str] = []
         self.finished = False
+        self.first = first
 
     def run(self) -> Event:
         """Runs until the result is there."""
-        self._list()
+        self._take(self.first.result())
         outcome = {"summary": "the result is there", "partial": bool(self.left_out)}
         while not self.finished:
             self._start()
@@ -73,7 +80,10 @@ class _Driver:
 
     def _list(self) -> None:
         """Takes the list of shards from the store."""
-        listed = self.job.shards()
+        self._take(self.job.shards())
+
+    def _take(self, listed: Event) -> None:
+        """Takes note of a list of shards."""
         self.shards = {shard["id"]: shard for shard in listed["shards"]}
         self.done |= {id for id, shard in self.shards.items() if shard["state"] == "done"}
         self.finished, self.left_out = listed["finished"], listed["left_out"]
@@ -96,23 +106,30 @@ class _Driver:
         memory = min((node.get("memory", 0) for node in nodes), default=0)
         # Few shards get several threads each.
         share = max(1, min(max(cores), sum(cores) // (len(ready) + len(started))))
+        # Ray does not keep the order of tasks that ask for different amounts of memory, and the longest shards must not
+        # come last: it gets those that have a place, and one a node that waits for its place there.
+        room = sum(cores) + len(cores) - sum(cpus for *_, cpus in self.running.values())
         for shard in sorted(ready, key=lambda shard: (-shard["seconds"], shard["id"])):
-            threads = max(cores) if shard["kind"] in JOINS else share
-            self._submit(shard, threads, int(min(shard["memory_bytes"], MEMORY * memory)))
+            if room <= 0:
+                break
+            cpus = max(cores) if shard["kind"] in JOINS else share
+            room -= cpus
+            self._submit(shard, cpus, int(min(shard["memory_bytes"], MEMORY * memory)))
 
-    def _submit(self, shard: Event, threads: int, memory: int) -> None:
+    def _submit(self, shard: Event, cpus: int, memory: int) -> None:
+        threads = cpus * (THREADS_OF_WAITS if shard["kind"] in WAITS else 1)
         line = self.job.command("shard", shard["id"]) + ["--threads", str(threads)]
         # Ray sets this to the number of processors that a task asks for; settings of the program stay the caller's.
         own = {name: value for name, value in os.environ.items() if name.startswith("STILLPOINT_")}
         environment = {"PATH": os.environ.get("PATH", ""), "HOME": os.environ.get("HOME", "/"), **own}
-        options = {"num_cpus": threads, "max_retries": self.job.attempts - 1, "name": f"{shard['id']}: {shard['what']}"}
+        options = {"num_cpus": cpus, "max_retries": self.job.attempts - 1, "name": f"{shard['id']}: {shard['what']}"}
         options |= {"memory": memory} if memory > 0 else {}
         reference = self.make.options(**options).remote(line, self.job.folder, environment)
-        self.running[reference] = (shard, time.monotonic())
+        self.running[reference] = (shard, time.monotonic(), cpus)
 
     def _end(self, reference) -> Event | None:
         """Takes note of the end of a task; returns the outcome of the job where it was the last."""
-        shard, begun = self.running.pop(reference)
+        shard, begun, _ = self.running.pop(reference)
         try:
             ended = self.ray.get(reference)
         except self.ray.exceptions.RayError as error:

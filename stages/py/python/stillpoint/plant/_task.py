@@ -7,7 +7,7 @@ import tempfile
 import time
 
 #: Seconds between looks at the process: waiting for it in one call could not be cancelled.
-LOOK = 0.05
+LOOK = 0.01
 
 
 def make(line: list[str], folder: str, environment: dict[str, str]) -> dict:
