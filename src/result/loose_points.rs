@@ -19,20 +19,20 @@ const EDGE: f64 = 0.02;
 /// demo's robots, scanned by four scanners, are at most three to a cell.
 const DENSE: u32 = 4;
 
-type Cell = [i64; 3];
+type AirCell = [i64; 3];
 
 /// Points around robots: what may be loose, and what holds it.
 #[derive(Default)]
 pub(super) struct BesideRobots {
     /// Number of points within [`BESIDE`] of a moving link, by cell.
-    near: HashMap<Cell, u32>,
+    near: HashMap<AirCell, u32>,
     /// Cells with points farther off.
-    held: HashSet<Cell>,
+    held: HashSet<AirCell>,
 }
 
 /// The cells whose points are loose.
 #[derive(Default)]
-pub(super) struct LooseCells(HashSet<Cell>);
+pub(super) struct LooseCells(HashSet<AirCell>);
 
 impl BesideRobots {
     /// Adds a point that does not move; world frame, metres.
@@ -64,11 +64,11 @@ impl BesideRobots {
     /// The cells that nothing holds.
     pub(super) fn loose(self) -> LooseCells {
         let Self { near, held } = self;
-        let is_held = |cell: &Cell, n: u32| {
+        let is_held = |cell: &AirCell, n: u32| {
             n >= DENSE || held.contains(cell) || beside(cell).any(|c| held.contains(&c))
         };
-        let mut loose: HashSet<Cell> = near.keys().copied().collect();
-        let mut next: Vec<Cell> =
+        let mut loose: HashSet<AirCell> = near.keys().copied().collect();
+        let mut next: Vec<AirCell> =
             near.iter().filter(|(c, n)| is_held(c, **n)).map(|(c, _)| *c).collect();
         next.iter().for_each(|cell| {
             loose.remove(cell);
@@ -87,12 +87,12 @@ impl LooseCells {
     }
 }
 
-fn cell_of(world: [f64; 3]) -> Cell {
+fn cell_of(world: [f64; 3]) -> AirCell {
     world.map(|v| (v / EDGE).floor() as i64)
 }
 
 /// The 26 cells around a cell.
-fn beside(cell: &Cell) -> impl Iterator<Item = Cell> {
+fn beside(cell: &AirCell) -> impl Iterator<Item = AirCell> {
     let [x, y, z] = *cell;
     (0..27_i64).filter(|i| *i != 13).map(move |i| {
         let [a, b, c] = [i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1];
@@ -104,28 +104,28 @@ fn beside(cell: &Cell) -> impl Iterator<Item = Cell> {
 mod tests {
     use super::*;
 
-    fn cells(near: &[(Cell, u32)], held: &[Cell]) -> Vec<Cell> {
+    fn cells(near: &[(AirCell, u32)], held: &[AirCell]) -> Vec<AirCell> {
         let beside = BesideRobots {
             near: near.iter().copied().collect(),
             held: held.iter().copied().collect(),
         };
-        let mut loose: Vec<Cell> = beside.loose().0.into_iter().collect();
+        let mut loose: Vec<AirCell> = beside.loose().0.into_iter().collect();
         loose.sort_unstable();
         loose
     }
 
     #[test]
     fn what_hangs_in_the_air_is_loose_and_what_something_holds_is_not() {
-        let row: Vec<(Cell, u32)> = (0..5).map(|x| ([x, 0, 0], 1)).collect();
-        let all: Vec<Cell> = row.iter().map(|(c, _)| *c).collect();
+        let row: Vec<(AirCell, u32)> = (0..5).map(|x| ([x, 0, 0], 1)).collect();
+        let all: Vec<AirCell> = row.iter().map(|(c, _)| *c).collect();
         assert_eq!(cells(&row, &[]), all);
         // A row that begins at a wall belongs to it, also over a corner.
-        assert_eq!(cells(&row, &[[-1, 1, 1]]), Vec::<Cell>::new());
+        assert_eq!(cells(&row, &[[-1, 1, 1]]), Vec::<AirCell>::new());
         // One cell off, it does not.
         assert_eq!(cells(&row, &[[-2, 0, 0]]), all);
         // A cell with fixed points is held itself, and what has a gap beside it is loose.
         assert_eq!(cells(&[([0, 0, 0], 1), ([2, 0, 0], 1)], &[[0, 0, 0]]), [[2, 0, 0]]);
         // A thing of many points stays, although nothing holds it.
-        assert_eq!(cells(&[([0, 0, 0], DENSE), ([1, 0, 0], 1)], &[]), Vec::<Cell>::new());
+        assert_eq!(cells(&[([0, 0, 0], DENSE), ([1, 0, 0], 1)], &[]), Vec::<AirCell>::new());
     }
 }

@@ -72,9 +72,9 @@ pub(crate) const THRIFTY: Thrift = Thrift {
     is_best_first: true,
 };
 
-/// Guessed planes, of which the coarse level tries every sixth at most: a base may stand 9 cm above or
-/// below the nearest one. There 50 right bases on hidden stands were judged 0.35 to 0.88, seven of
-/// them below 0.5.
+/// Guessed planes, of which the coarse level tries every sixth at most: a base may stand 9 cm above
+/// or below the nearest one. There 50 right bases on hidden stands were judged 0.35 to 0.88, seven
+/// of them below 0.5.
 pub(crate) const GUESSING: Thrift = Thrift { min_judged: 0.1, ..THRIFTY };
 
 /// Depth cameras, which bend surfaces and see little of a base; robots that moved between scans;
