@@ -9,7 +9,7 @@
 
 use clearance::OwnSurface;
 use contract::PointKind;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Distance from a moving link within which points may be loose, metres: as in `check`.
 const BESIDE: f64 = 0.1;
@@ -25,14 +25,14 @@ type AirCell = [i64; 3];
 #[derive(Default)]
 pub(super) struct BesideRobots {
     /// Number of points within [`BESIDE`] of a moving link, by cell.
-    near: HashMap<AirCell, u32>,
+    near: BTreeMap<AirCell, u32>,
     /// Cells with points farther off.
-    held: HashSet<AirCell>,
+    held: BTreeSet<AirCell>,
 }
 
 /// The cells whose points are loose.
 #[derive(Default)]
-pub(super) struct LooseCells(HashSet<AirCell>);
+pub(super) struct LooseCells(BTreeSet<AirCell>);
 
 impl BesideRobots {
     /// Adds a point that does not move; world frame, metres.
@@ -67,7 +67,7 @@ impl BesideRobots {
         let is_held = |cell: &AirCell, n: u32| {
             n >= DENSE || held.contains(cell) || beside(cell).any(|c| held.contains(&c))
         };
-        let mut loose: HashSet<AirCell> = near.keys().copied().collect();
+        let mut loose: BTreeSet<AirCell> = near.keys().copied().collect();
         let mut next: Vec<AirCell> =
             near.iter().filter(|(c, n)| is_held(c, **n)).map(|(c, _)| *c).collect();
         next.iter().for_each(|cell| {
@@ -109,9 +109,7 @@ mod tests {
             near: near.iter().copied().collect(),
             held: held.iter().copied().collect(),
         };
-        let mut loose: Vec<AirCell> = beside.loose().0.into_iter().collect();
-        loose.sort_unstable();
-        loose
+        beside.loose().0.into_iter().collect()
     }
 
     #[test]

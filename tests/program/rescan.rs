@@ -203,7 +203,9 @@ fn exports_leave_out_what_is_superseded(plant: &Plant, things: &[serde_json::Val
         let report: serde_json::Value = serde_json::from_str(&report).expect("it parses");
         let n = |which: &str| report.pointer(which).and_then(serde_json::Value::as_u64);
         let own = n("/left_out/uncertain_points_on_robots").expect("a number");
-        (inside, n("/points").expect("a number") + own)
+        let loose = n("/left_out/uncertain_points_in_the_air_beside_robots").expect("a number");
+        assert!(loose > 0, "{report}");
+        (inside, n("/points").expect("a number") + own + loose)
     };
     let (before, _) = meshed("base");
     let (after, n_meshed) = meshed("again");
