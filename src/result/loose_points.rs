@@ -7,12 +7,12 @@
 //! loose. Single points that are labelled as fixed hold nothing, for masks miss some points of a
 //! robot, but they are not left out.
 
-use clearance::OwnSurface;
+use clearance::{BESIDE_REACH, OwnSurface};
 use contract::PointKind;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Distance from a moving link within which points may be loose, metres: as in `check`.
-const BESIDE: f64 = 0.1;
+const BESIDE: f64 = BESIDE_REACH as f64;
 /// Edge of a cell, metres.
 const EDGE: f64 = 0.02;
 /// Number of points from which on a cell is part of a thing, as in `check`: mixed pixels of the

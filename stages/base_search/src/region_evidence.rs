@@ -100,8 +100,7 @@ impl<'a> RegionEvidence<'a> {
     }
 
     /// Samples of a body at a pose that it is then shifted from, mostly along an axis, for many
-    /// quick scores; `None` if
-    /// the grid does not serve the tolerance (metres).
+    /// quick scores; `None` if the grid does not serve the tolerance (metres).
     pub(crate) fn stencil(
         &self,
         axis: RowAxis,

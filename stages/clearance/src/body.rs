@@ -23,7 +23,7 @@ const BETWEEN: f32 = 0.5 * STEP as f32;
 
 /// Distance from the robot as scanned within which uncertain points are most likely its own,
 /// metres: edges, cables and covers that its model lacks.
-const BESIDE_REACH: f32 = 0.1;
+pub const BESIDE_REACH: f32 = 0.1;
 
 /// Distance from a link's surface as scanned within which a point belongs to the link, metres.
 /// Labels of links reach 6 to 12 mm. The points of an object that touches the robot remain beyond

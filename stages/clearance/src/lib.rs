@@ -52,7 +52,7 @@ mod pockets;
 mod shadow;
 mod shape;
 
-pub use body::{AttachedPoints, RobotBody, STEP, reach};
+pub use body::{AttachedPoints, BESIDE_REACH, RobotBody, STEP, reach};
 pub use cells::{Cells, FARTHEST, PointCell};
 pub use contact_level::ContactLevel;
 pub use evidence::attached_points;
